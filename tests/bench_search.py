@@ -18,9 +18,9 @@ from sweep.metrics.bound import FEASIBLE, total_violation
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.separation import separation
 from sweep.metrics.smooth import smooth_response
-from sweep.search.limit import limit_of
 from sweep.search.problem import starting_points
 from sweep.search.solver import search_from
+from sweep.search.upper_bound import upper_bound_of
 from sweep.study import load_study
 
 ROOT = Path(__file__).parent.parent
@@ -134,7 +134,7 @@ TOOLS: dict[str, Callable[[Counted, int], list[float]]] = {
 
 
 def main() -> None:
-    limit = limit_of(Counted().problem)
+    limit = upper_bound_of(Counted().problem)
     traces = {}
     for name, tool in TOOLS.items():
         rows = []
@@ -150,7 +150,7 @@ def main() -> None:
     record = {
         "budget": BUDGET,
         "seeds": len(SEEDS),
-        "limit": limit.proven,
+        "upper_bound": limit.proven,
         "median_dn": {name: np.median(rows, axis=0).tolist() for name, rows in traces.items()},
         "worst_dn": {name: rows.min(axis=0).tolist() for name, rows in traces.items()},
     }

@@ -30,7 +30,7 @@ def isp_table() -> list[str]:
     study = load_study(ROOT / "studies" / "vision.yaml")
     lines = ["| CFA | light | white | matrix to R, G, B |", "| --- | --- | --- | --- |"]
     lights: tuple[Illuminant, ...] = ("daylight", "LED street light")
-    for name, light in product(("RGGB", "RCCB", "RYYCy", "RYN4Cy"), lights):
+    for name, light in product(("RGGB", "RCCB", "RYYCy", "paper_N4"), lights):
         (space,) = (one for one in study.spaces if one.name == name)
         camera = study.setup(space, next(iter(study.scenarios))).camera
         qe = camera.qe.copy()

@@ -269,15 +269,47 @@ def parameter_file(objective, x, jacobian, made_by):
     return "\n".join([*comments, *file_lines({**with_values(objective.free, x), "provenance": provenance}), ""])
 
 
+def leaves(node, path=()):
+    """Each number of a parameter tree that a fit moves, or moves along: its path, and the number."""
+    for key, value in node.items() if isinstance(node, dict) else enumerate(node):
+        if isinstance(value, dict | list):
+            if key not in ("provenance", "wavelength_nm"):
+                yield from leaves(value, (*path, key))
+        elif not isinstance(value, str):
+            yield (*path, key), value
+
+
+def write_fits(objective, count, path):
+    """Fit from draws of the prior until `count` fits meet every figure, and write them: a column each."""
+    columns = {}
+    for start in itertools.count(1):
+        x, found = fit(objective, start)
+        known = summary(objective, x)
+        met = known["figures met"] == len(objective.targets)
+        print(f"start {start}: cost {found.cost:.1f}, {known['figures met']} figures met", flush=True)
+        if met:
+            numbers = {".".join(map(str, at)): value for at, value in leaves(with_values(objective.free, x))}
+            columns[str(len(columns) + 1)] = pd.Series(numbers)
+        if len(columns) == count:
+            break
+    pd.DataFrame(columns).rename_axis("parameter").to_csv(path, lineterminator="\n")
+
+
 def main(arguments):
     """Fit, compare, and write where asked to."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--starts", type=int, default=1, metavar="N", help="the prior's mean, then draws of the prior")
     parser.add_argument("--output", type=Path, metavar="FILE", help="write the parameter file")
+    parser.add_argument("--fits", type=int, metavar="N", help="write N fits to --output that meet every figure")
     asked = parser.parse_args(arguments)
     if asked.starts < 1:
         parser.error("--starts must be at least 1")
+    if asked.fits is not None and asked.output is None:
+        parser.error("--fits needs --output")
     objective, fits = Objective(PRINTED), []
+    if asked.fits is not None:
+        write_fits(objective, asked.fits, asked.output)
+        return
     for start in range(asked.starts):
         fits.append(fit(objective, start))
         print(f"start {start}: cost {fits[-1][1].cost:.1f} after {fits[-1][1].nfev} evaluations", flush=True)

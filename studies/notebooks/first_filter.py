@@ -47,7 +47,7 @@ print(plain.set_index("cfa")[["csd_yellow_red", "cfa_sensitivity"]].round(3))
 # How good could any filter be that keeps the study's constraints? No filter, of whatever shape, exceeds this:
 
 # %%
-limit = study.limit()
+limit = study.upper_bound()
 print(f"{limit.proven:.1f} DN is the limit; ours reaches {table.csd_yellow_red[0] / limit.proven:.0%} of it")
 
 # %% [markdown]

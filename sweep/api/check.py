@@ -79,7 +79,8 @@ def plan(
     Returns
     -------
     Answer
-        Each effect of each scene: whether it is computed, and a bound on what it changes; as a mapping in ``facts``.
+        Each effect of each scene: whether it is computed, and a bound on what it changes; what all that is left out
+        changes at most, and how much time that saves; as a mapping in ``facts``.
 
     Raises
     ------
@@ -87,6 +88,7 @@ def plan(
         As `check`, and for a tolerance that is none.
     """
     from ..report.scenes import plan_facts, plan_lines  # noqa: PLC0415  (tables of pandas: few need them)
+    from ..runs.dry_run import seconds_of_effects  # noqa: PLC0415
 
     if tolerance_dn is not None and not 0 < tolerance_dn < math.inf:
         raise StudyError(ValidationIssue("no tolerance", None, None, "--tolerance", tolerance_dn, "above 0 DN, finite"))
@@ -94,4 +96,5 @@ def plan(
     loaded = load_study(study_path(Path(study)), folder, changes=changes or {}, allow_code=allow_code)
     planned = loaded.with_plans(tolerance_dn)
     notes = [f"Note: {warning}." for warning in loaded.warnings]
-    return Answer([*notes, *plan_lines(planned)], plan_facts(planned))
+    seconds = seconds_of_effects(planned)
+    return Answer([*notes, *plan_lines(planned, seconds)], plan_facts(planned, seconds))

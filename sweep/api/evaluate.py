@@ -99,7 +99,7 @@ def evaluate(source: Path | str, *, design: str | int | None = None, **options: 
     source : path-like
         A file with the filter's curve, or the folder of a finished run.
     design : str or int, optional
-        A design of the run: a `filter_id`, a name (RYN4Cy, RGGB), or ``best`` (default).
+        A design of the run: a `filter_id`, a name (paper_N4, RGGB), or ``best`` (default).
     **options
         Fields of `EvaluateOptions`: column, channel, cfa, base, sensor, lights, quantity, relative_to, transmission;
         for a run also data and allow_code.

@@ -21,7 +21,7 @@ from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
 from ..metrics.quantity import Column, Columns
 from ..metrics.separation import csd_name
 from ..metrics.smooth import smooth_csd
-from ..search.limit import gap_between
+from ..search.upper_bound import gap_between
 from ..spectra.lights import Pair, class_pairs
 from ..study import Study
 from .loading import CurveSource, make_study
@@ -87,12 +87,12 @@ class FilterEvaluation:
         CFA with the filter.
     before_quantization_dn : float or None
         CSD of the filter before quantization, DN.
-    limit : float or None
+    upper_bound : float or None
         Upper bound on that CSD, DN, for any filter between 0 and the curve `below`, of the same technology and with at
-        least as much light, in the first scenario. None if `no_limit` states a reason.
+        least as much light, in the first scenario. None if `no_upper_bound` states a reason.
     below : str
         Curve below which the bound holds.
-    no_limit : str
+    no_upper_bound : str
         Reason why there is no bound.
     notes : tuple of str
         Notes on the way files were read.
@@ -111,9 +111,9 @@ class FilterEvaluation:
     goal: Column
     cfa: str
     before_quantization_dn: float | None
-    limit: float | None
+    upper_bound: float | None
     below: str
-    no_limit: str
+    no_upper_bound: str
     notes: tuple[str, ...]
     others: tuple[Column, ...] = ()
     technology: Technology | None = None
@@ -142,9 +142,9 @@ class FilterEvaluation:
     @property
     def gap(self) -> float | None:
         """Distance of the filter to its upper bound, relative to the bound."""
-        if self.limit is None or self.before_quantization_dn is None or not self.limit > 0:
+        if self.upper_bound is None or self.before_quantization_dn is None or not self.upper_bound > 0:
             return None
-        return gap_between(self.before_quantization_dn, self.limit)
+        return gap_between(self.before_quantization_dn, self.upper_bound)
 
     problem: ClassVar[None] = None
     """An evaluation is no problem of the command, however bad the filter."""
@@ -159,11 +159,11 @@ class FilterEvaluation:
         """The same as plain values."""
         return {
             "rows": self.table.to_dict("records"),
-            "limit_of": self.goal.name,
-            "limit_dn": self.limit,
+            "upper_bound_of": self.goal.name,
+            "upper_bound": self.upper_bound,
             "before_quantization_dn": self.before_quantization_dn,
             "gap": self.gap,
-            "no_limit": self.no_limit,
+            "no_upper_bound": self.no_upper_bound,
             "constraints_of": self.of_study,
             "violated": self.violated,
             "notes": self.notes,
@@ -187,11 +187,11 @@ class FilterEvaluation:
             yield f"Constraints of the study {self.of_study} ({stated}): {met}."
         if brightest := self.study.sensor.brightest:
             yield f"Light: 1 = {reference_of(brightest)}."
-        if self.limit is None or self.before_quantization_dn is None:
-            yield f"No limit is computed: {self.no_limit}."
+        if self.upper_bound is None or self.before_quantization_dn is None:
+            yield f"No upper bound is computed: {self.no_upper_bound}."
             return
         gap = "" if self.gap is None else f", {100 * self.gap:.1f} % below"
-        bound, has = self.goal.format_bound(self.limit), self.goal.amount(self.before_quantization_dn, 1)
+        bound, has = self.goal.format_bound(self.upper_bound), self.goal.amount(self.before_quantization_dn, 1)
         alike = "" if self.technology is None else f" that works by {self.technology.description}"
         where = f" in {scenes[0]}" if len(scenes) > 1 else ""
         yield (

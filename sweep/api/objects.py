@@ -14,7 +14,7 @@ from ..base.errors import OutputError, SweepError, ValidationIssue, nearest
 from ..camera.plan import Plan
 from ..designs.space import Space
 from ..metrics.quantity import Column, Quantity
-from ..search.limit import Limit
+from ..search.upper_bound import UpperBound
 from ..study import Study
 from .inline_curves import CurveLike, filter_on_grid, on_grid, wavelength_table
 from .own_designs import are_parameters, designs_of_curves, designs_of_parameters, evaluate_spaces, plain_and_named
@@ -180,14 +180,14 @@ class LoadedStudy:
         curves = np.stack([*rows.values()], axis=1)
         return evaluate_spaces(study, [designs_of_curves(study, chosen, bases, curves)], scenarios)
 
-    def limit(
+    def upper_bound(
         self,
         *,
         cfa: str | None = None,
         channel: str | None = None,
         scenario: str | None = None,
         sensitivity: float | None = None,
-    ) -> Limit:
+    ) -> UpperBound:
         """Compute the upper bound on the CSD of any filter in a channel.
 
         It holds for filters between the least transmission and the curve that they replace, under the study's
@@ -204,7 +204,7 @@ class LoadedStudy:
 
         Returns
         -------
-        Limit
+        UpperBound
             ``.proven``, the upper bound, DN; ``.attained`` and ``.curve``, the CSD and QE of a filter near it;
             ``.left_out``, constraints that the bound does not use.
 
@@ -221,7 +221,7 @@ class LoadedStudy:
             problem = with_lower_bound(problem, "sensitivity", sensitivity)
         limit, reason = upper_bound_or_reason(problem)
         if limit is None:
-            raise SweepError(ValidationIssue(f"no limit: {reason}"))
+            raise SweepError(ValidationIssue(f"no upper bound: {reason}"))
         return limit
 
     def plot(self, **channels: CurveLike) -> Figure:
@@ -368,7 +368,7 @@ class FinishedRun:
         Parameters
         ----------
         design : str or int
-            A `filter_id`, a name (RYN4Cy, RGGB), or best.
+            A `filter_id`, a name (paper_N4, RGGB), or best.
 
         Returns
         -------

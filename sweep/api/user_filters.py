@@ -15,8 +15,8 @@ from ..designs.families.stopband import Stopband
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.quantity import Column, Columns
-from ..search.limit import Limit, limit_of, reason_without_bound
 from ..search.problem import Problem
+from ..search.upper_bound import UpperBound, reason_without_bound, upper_bound_of
 from ..study import Study
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def with_exposure_unchanged(problem: Problem) -> Problem:
     return replace(problem, constraints={**problem.constraints, SENSITIVITY: bound})
 
 
-def upper_bound_or_reason(problem: Problem) -> tuple[Limit | None, str]:
+def upper_bound_or_reason(problem: Problem) -> tuple[UpperBound | None, str]:
     """Compute the upper bound of a problem, or state why there is none."""
     reason = reason_without_bound(problem)
-    return (limit_of(problem), "") if reason is None else (None, reason)
+    return (upper_bound_of(problem), "") if reason is None else (None, reason)

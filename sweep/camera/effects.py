@@ -1,30 +1,34 @@
 """Effects of the camera: when each is active, and a closed-form bound on the change of any CSD without it.
 
-A CSD is a distance of two points with a coordinate for each channel. If leaving an effect out moves each coordinate of
-their difference by at most d, the distance changes by at most d sqrt(channels).
+A CSD is a distance of two points with a coordinate for each channel, or, by pixel, for each of four pixels. If leaving
+an effect out moves each coordinate of their difference by at most d, the distance changes by at most d times the root
+of their number.
 
-Bounds hold for every design of a box, in DN. Light that is a share s less moves a pixel of at most P DN by s P, and
-the difference of two pixels by at most twice that. A readout that clips moves by no more than its input. One that
-rounds without noise may move by a whole step more for each pixel; with Gaussian read noise sigma (DN) the mean of the
-rounded value is steeper than the value by at most 1 + 2 sum over k of exp(-2 (pi k sigma)^2).
+Bounds hold for every design of a box, in DN. Readings of all lights that move by between m and M move their
+differences by at most M - m, of all in the same sense by at most M. A readout that clips moves no more than its input,
+in the same sense. One that rounds without noise may move by a whole step more for each pixel; with Gaussian read noise
+sigma (DN) the mean of the rounded value is steeper by at most 1 + 2 sum over k of exp(-2 (pi k sigma)^2).
+
+Light of all signals times one factor takes that factor of every distance, if the readout is linear: then a gray loss
+changes no CSD by more than its share of it, and a CSD is no more than the distance of any two lights of its types.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..base.types import Array, ChannelCurves, Float
 from . import pwm
-from .angular import known_at
+from .angular import AngularResponse, known_at
 from .exposure import exposure_times, white_irradiance
 from .irradiance import air_transmittance, background_irradiance, relative_illumination, signal_irradiance
 from .noise import gaussian, tails
-from .setup import Setup
+from .setup import READOUT, Setup
 
 _STEEPEST_TERMS = 50
 
@@ -55,6 +59,20 @@ class Box:
         return pwm.smallest(drive, *self._exposures_s), pwm.largest(drive, *self._exposures_s)
 
     @cached_property
+    def _sharp(self) -> Setup:
+        return replace(self.setup, left_out=self.setup.left_out | {"veiling glare"})
+
+    @cached_property
+    def signals(self) -> Float[Array, "signals wavelengths"]:
+        """Photon irradiance of each signal without glare, photons/s/m2/nm: the most that it may be."""
+        return signal_irradiance(self._sharp)
+
+    @cached_property
+    def backgrounds(self) -> Float[Array, "two wavelengths"]:
+        """Photon irradiance of the background with and without glare, photons/s/m2/nm."""
+        return np.stack([background_irradiance(self.setup), background_irradiance(self._sharp)])
+
+    @cached_property
     def _highest(self) -> ChannelCurves:
         """Upper bound on the curves in the cone of rays.
 
@@ -72,7 +90,7 @@ class Box:
         """Largest unclipped response of any channel to a signal whose image is whole, without pedestal, DN."""
         camera = self.setup.camera
         dn = self._exposures_s[1] * self.light_range[1] * camera.pixel.dn_per_e
-        signals = signal_irradiance(self.setup) * camera.area_bins_m2_nm
+        signals = self.signals * camera.area_bins_m2_nm
         return float((signals @ self._highest.T).max() * dn)
 
     @cached_property
@@ -80,12 +98,33 @@ class Box:
         """`brightest_signal_dn` with background and dark current, DN."""
         setup, time_s = self.setup, self._exposures_s[1]
         camera = setup.camera
-        background = (self._highest @ (background_irradiance(setup) * camera.area_bins_m2_nm)).max()
+        background = (self._highest @ (self.backgrounds.max(axis=0) * camera.area_bins_m2_nm)).max()
         return self.brightest_signal_dn + float(background + camera.pixel.dark_e_per_s) * time_s * camera.pixel.dn_per_e
 
     @property
     def _sqrt_channels(self) -> float:
-        return math.sqrt(len(self.setup.camera.mosaic.channels))
+        """Root of the number of coordinates of a CSD: its channels, or four pixels."""
+        return math.sqrt(max(len(self.setup.camera.mosaic.channels), 4))
+
+    @cached_property
+    def _dn(self) -> Float[Array, " wavelengths"]:
+        """Most DN of photons/s/m2/nm on a QE of 1 in each bin of the grid."""
+        camera = self.setup.camera
+        most_s = self._exposures_s[1] * self.light_range[1]
+        return np.asarray(camera.area_bins_m2_nm * (most_s * camera.pixel.dn_per_e), dtype=float)
+
+    def most_dn(self, light: Float[Array, "lights wavelengths"]) -> float:
+        """Largest reading of any channel of some light, DN."""
+        return float((light * self._dn @ self._highest.T).max(initial=0.0))
+
+    @cached_property
+    def largest_csd_dn(self) -> float:
+        """Bound on every CSD: the distance of the first two lights of its types, DN."""
+        members, light = self.setup.lights.members, self.signals * self._dn
+        first = np.stack([light[numbers[0]] for numbers in members.values()])
+        differences = first[:, None] - first[None]
+        most = np.maximum(differences, 0.0) @ self._highest.T  # of a and b, and exchanged: of either sign
+        return float(np.maximum(most, most.swapaxes(0, 1)).max()) * self._sqrt_channels
 
 
 def any_filter(setup: Setup) -> Box:
@@ -110,14 +149,28 @@ class Effect:
     bound_dn: Callable[[Box, frozenset[str]], float] | None = None
 
 
-def _share_bound_dn(box: Box, share: float, readout: frozenset[str]) -> float:
-    """Return the bound for light that is reduced by a share."""
-    result = 2 * share * box.brightest_pixel_dn * box._sqrt_channels
+def _read_dn(box: Box, moved_dn: float, readout: frozenset[str]) -> float:
+    """Return the bound for differences of readings that move by an amount before they are rounded."""
+    result = moved_dn * box._sqrt_channels
     if "quantization" not in readout:
         return result
     if box.setup.scene.noise is None:
-        return result + 2 * box._sqrt_channels * (share > 0)
+        return result + 2 * box._sqrt_channels * (moved_dn > 0)
     return result * _steepness(box.setup.camera.pixel.dn_per_e * box.setup.camera.pixel.read_noise_e)
+
+
+def _dimmed_dn(box: Box, kept: Float[Array, " #wavelengths"], readout: frozenset[str], added_dn: float = 0.0) -> float:
+    """Return the bound for signals that are dimmed by a factor of each wavelength.
+
+    `added_dn`: what is added to all pixels alike, of either sign; it counts where the readout is not linear.
+    """
+    lost = box.signals * (1 - kept)
+    if readout & READOUT:
+        return _read_dn(box, box.most_dn(lost) + abs(added_dn), readout)
+    gray = float(1 - kept.max())
+    colored = (kept.max() - kept) * box.signals
+    of_factor = gray * box.largest_csd_dn + box.most_dn(colored) * box._sqrt_channels
+    return min(_read_dn(box, box.most_dn(lost), readout), of_factor)
 
 
 def _steepness(sigma_dn: float) -> float:
@@ -215,12 +268,51 @@ def _unpulsed(box: Box) -> str | None:
 
 def _pwm_bound_dn(box: Box, readout: frozenset[str]) -> float:
     least, most = box.light_range
-    return _share_bound_dn(box, max(1 - least, most - 1) / most, readout)
+    share = max(1 - least, most - 1) / most
+    return _read_dn(box, 2 * share * box.brightest_pixel_dn, readout)
 
 
 def _air_bound_dn(box: Box, readout: frozenset[str]) -> float:
-    lost = 1 - float(air_transmittance(box.setup.scene, box.setup.camera.grid.nodes_nm).min())
-    return _share_bound_dn(box, lost, readout)
+    return _dimmed_dn(box, air_transmittance(box.setup.scene, box.setup.camera.grid.nodes_nm), readout)
+
+
+def _illumination_bound_dn(box: Box, readout: frozenset[str]) -> float:
+    kept = relative_illumination(box.setup.scene)
+    return _dimmed_dn(box, np.array([kept]), readout, box.most_dn(box.backgrounds * (1 - kept)))
+
+
+def _glare_bound_dn(box: Box, readout: frozenset[str]) -> float:
+    glare = box.setup.scene.veiling_glare
+    assert glare is not None
+    added = np.abs(box.backgrounds[:1] - box.backgrounds[1:])
+    return _dimmed_dn(box, np.array([1 - glare.share]), readout, box.most_dn(added))
+
+
+def _crosstalk_bound_dn(box: Box, readout: frozenset[str]) -> float:
+    """Return the bound for light that pixels exchange; in a uniform field neighbors of one kind change nothing."""
+    mosaic, share = box.setup.camera.mosaic, box.setup.camera.pixel.crosstalk
+    if box.setup.scene.target is None:
+        at = mosaic.indices
+        others = np.mean([np.roll(at, step, axis) != at for axis in (0, 1) for step in (-1, 1)], axis=0)
+        share *= max(float(others[at == channel].mean()) for channel in range(len(mosaic.channels)))
+    return _read_dn(box, 2 * share * box.brightest_pixel_dn, readout)
+
+
+def _angle_bound_dn(box: Box, readout: frozenset[str]) -> float:
+    """Return the bound for filters that move, of a patch at one place: as if the light moved the other way."""
+    setup = box.setup
+    if setup.scene.target is not None or setup.scene.field is not None:
+        return math.inf
+    light, matrices = box.signals * box._dn, AngularResponse(setup.with_all_effects).matrices
+    moved = [0.0]
+    for channel, matrix in matrices.items():
+        change = (matrix.T @ light.T).T - light
+        most, least = (
+            np.maximum(sign * change, 0) @ box.high[channel] - np.maximum(-sign * change, 0) @ box.low[channel]
+            for sign in (1, -1)
+        )
+        moved.append(max(float(most.max()), 0.0) + max(float(least.max()), 0.0))
+    return _read_dn(box, max(moved), readout)
 
 
 EFFECTS: dict[str, Effect] = {
@@ -237,13 +329,13 @@ EFFECTS: dict[str, Effect] = {
         Effect(
             "crosstalk",
             lambda box: None if box.setup.camera.pixel.crosstalk else "no crosstalk",
-            lambda box, readout: _share_bound_dn(box, 2 * box.setup.camera.pixel.crosstalk, readout),
+            _crosstalk_bound_dn,
         ),
-        Effect("angle", _not_moving),
+        Effect("angle", _not_moving, _angle_bound_dn),
         Effect(
             "illumination",
             lambda box: None if box.setup.scene.off_axis_deg else "on axis",
-            lambda box, readout: _share_bound_dn(box, 1 - relative_illumination(box.setup.scene), readout),
+            _illumination_bound_dn,
         ),
         Effect("field", _one_field_position),
         Effect(
@@ -254,6 +346,7 @@ EFFECTS: dict[str, Effect] = {
         Effect(
             "veiling glare",
             lambda box: "no veiling glare" if box.setup.scene.veiling_glare is None else None,
+            _glare_bound_dn,
         ),
         Effect("flicker", _unpulsed, _pwm_bound_dn),
     )

@@ -26,7 +26,7 @@ _CONTRAST = 0.02
 def scene_irradiance(setup: Setup) -> Irradiance:
     """Return the irradiance of a scene behind veiling glare and the effects of user code, photons/s/m2/nm."""
     irradiance = Irradiance(setup.camera.grid.nodes_nm, _signals(setup), _uniform(setup, setup.scene.background_cd_m2))
-    if setup.scene.veiling_glare is not None:
+    if setup.scene.veiling_glare is not None and setup.computes("veiling glare"):
         glare = setup.scene.veiling_glare
         mean_cd_m2 = setup.scene.background_cd_m2 if glare.field_cd_m2 is None else glare.field_cd_m2
         # As much in the corner as in the center: the loss of the lens off axis, which follows, does not touch it.

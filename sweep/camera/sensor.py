@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..base.types import Array, Float, PerWavelength
 from ..designs.technology import Technology
 from ..spectra.builtin.ar0820 import ar0820, ir_cut_transmission
 from ..spectra.builtin.measured_sets import SENSORS, WIDE, ir_cut
-from ..spectra.builtin.surrogate import SurrogateParameters, surrogate_parameters
+from ..spectra.builtin.surrogate import FITS, SurrogateParameters, surrogate_fit, surrogate_parameters
 from ..spectra.spectrum import WavelengthGrid
 from .mosaic import Mosaic
 
@@ -128,6 +128,10 @@ def ar0820_sensor(grid: WavelengthGrid, parameters: SurrogateParameters) -> Sens
     return SensorCurves("ar0820", curves.values, "C", curves.source, True, variants, ir_cut=cut)
 
 
+def _sensor_of_fit(number: int, grid: WavelengthGrid) -> SensorCurves:
+    return replace(ar0820_sensor(grid, surrogate_fit(number)), name=f"ar0820@{number}")
+
+
 def measured_sensor(name: str, grid: WavelengthGrid) -> SensorCurves:
     """Make a measured sensor that the package ships.
 
@@ -144,6 +148,7 @@ def measured_sensor(name: str, grid: WavelengthGrid) -> SensorCurves:
 
 BUILT_IN_SENSORS: dict[str, Callable[[WavelengthGrid], SensorCurves]] = {
     "ar0820": lambda grid: ar0820_sensor(grid, surrogate_parameters()),
+    **{f"ar0820@{number}": partial(_sensor_of_fit, number) for number in range(1, FITS + 1)},
     **{name: partial(measured_sensor, name) for name in SENSORS},
 }
 """Sensors that a study can name; each is a function of the wavelength grid (inside 400-700 nm)."""

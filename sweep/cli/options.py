@@ -81,11 +81,13 @@ Jobs = Annotated[
 ]
 Force = Annotated[bool, typer.Option("--force", "-f", help="Replace files of other content.")]
 Design = Annotated[
-    str | None, typer.Option("--design", help="A filter_id, a name (RYN4Cy, RGGB), or best.", show_default=False)
+    str | None, typer.Option("--design", help="A filter_id, a name (paper_N4, RGGB), or best.", show_default=False)
 ]
 Designs = Annotated[
     list[str] | None,
-    typer.Option("--design", help="A filter_id, a name (RYN4Cy, RGGB), or best; may be repeated.", show_default=False),
+    typer.Option(
+        "--design", help="A filter_id, a name (paper_N4, RGGB), or best; may be repeated.", show_default=False
+    ),
 ]
 Quantities = Annotated[
     list[str] | None,

@@ -30,11 +30,11 @@ def band_parameters(number: int | None = None) -> tuple[Parameter, ...]:
     """
     n = "" if number is None else str(number)
     return (
-        Parameter(f"left{n}_nm", 200, 2000),
-        Parameter(f"left{n}_width_nm", 0, 500),
-        Parameter(f"right{n}_nm", 200, 2000),
-        Parameter(f"right{n}_width_nm", 0, 500),
-        Parameter(f"depth{n}", 0, 1, default=1.0),
+        Parameter(f"left{n}_nm", 200, 2000, unit="nm", meaning="middle of the band's left edge"),
+        Parameter(f"left{n}_width_nm", 0, 500, unit="nm", meaning="width of its left edge, 10 to 90 %"),
+        Parameter(f"right{n}_nm", 200, 2000, unit="nm", meaning="middle of the band's right edge"),
+        Parameter(f"right{n}_width_nm", 0, 500, unit="nm", meaning="width of its right edge, 10 to 90 %"),
+        Parameter(f"depth{n}", 0, 1, default=1.0, meaning="share of the way to the target curve inside the band"),
     )
 
 

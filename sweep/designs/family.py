@@ -42,12 +42,16 @@ class Parameter:
         Range of definition.
     default : float, optional
         Default.
+    unit, meaning : str
+        As the result tables state them; no unit for a ratio.
     """
 
     name: str
     low: float
     high: float
     default: float | None = None
+    unit: str = ""
+    meaning: str = "parameter of an own family, unit in the name"
 
 
 class Family(ABC):

@@ -88,7 +88,7 @@ class PluginFamily(Family):
 def _parameters(kind: str, stated: Any) -> tuple[Parameter, ...]:
     """Check and return the parameters of a class."""
     try:
-        parameters = tuple(Parameter(str(name), *map(float, numbers)) for name, *numbers in stated)
+        parameters = tuple(Parameter(str(name), float(low), float(high)) for name, low, high in stated)
     except (TypeError, ValueError):
         parameters = ()
     names = [parameter.name for parameter in parameters]

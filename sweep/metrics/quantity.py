@@ -33,6 +33,8 @@ BEST_PHASE = "best_phase_"
 worst moment of a pulsed light."""
 DN = "DN"
 """Unit of digital numbers."""
+UPPER_BOUND = "upper_bound"
+"""Column of what no filter exceeds, beside the answer of a search, in the unit of the objective."""
 LOG10 = "decades"
 """Unit of how far an error is below 1: its logarithm to base 10."""
 Columns = dict[str, FloatArray]

@@ -49,7 +49,7 @@ def export(
     folder : path-like
         Folder of a finished run.
     design : str or int, or several
-        A `filter_id`, a name (RYN4Cy, RGGB), or best.
+        A `filter_id`, a name (paper_N4, RGGB), or best.
     data : path-like, optional
         Folder of the study's files; left out, the curves that the run kept are taken.
     output : path-like, optional

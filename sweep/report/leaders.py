@@ -86,13 +86,13 @@ def label(row: Row) -> str:
 def upper_bound(output: Output) -> SearchFacts | None:
     """Return the search that proved an upper bound on the separation of the trade-off.
 
-    `limit_proven` bounds any filter in one channel of a CFA, in one scenario, before quantization, under the study's
-    constraints, between the least transmission and the replaced curve, of the kinds and spaces in `bounded`.
+    `upper_bound_proven` bounds any filter in one channel of a CFA, in one scenario, before quantization, under the
+    study's constraints, between the least transmission and the replaced curve, of the kinds and spaces in `bounded`.
 
     None without one.
     """
     search = output.provenance.search
-    if search is None or search.limit_proven is None or output.goal.name != output.trade_off[0].name:
+    if search is None or search.upper_bound_proven is None or output.goal.name != output.trade_off[0].name:
         return None
     return search
 
@@ -108,9 +108,9 @@ def upper_bound_beside(output: Output, row: Row) -> float | None:
     search = upper_bound(output)
     if search is None or not row["feasible"] or row["scenario"] != search.scenario or row["kind"] == REFERENCE:
         return None
-    if search.limit_proven is None or f"{row['kind']} {row['space']}" not in search.bounded:
+    if search.upper_bound_proven is None or f"{row['kind']} {row['space']}" not in search.bounded:
         return None
-    value, bound = float(row[output.goal.name]), search.limit_proven
+    value, bound = float(row[output.goal.name]), search.upper_bound_proven
     if value <= bound:
         return bound
     by_pixel = output.goal.metric in (PIXEL_CSD, CHROMATIC_PIXEL_CSD)

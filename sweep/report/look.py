@@ -59,7 +59,7 @@ _KNOWN = {
     "RCCB": Style("#767676", (0, (6, 3)), "^", "#6a6a6a"),
     "RCCC": Style("#a6a6a6", (0, (1, 2)), "v", "#757575"),
     "RYYCy": Style("#b07a00", (0, (6, 2, 1, 2)), "D", "#8a5f00"),
-    "RYN4Cy": Style("#39b1e2", (0, (4, 2)), "o", "#11749f"),
+    "paper_N4": Style("#39b1e2", (0, (4, 2)), "o", "#11749f"),
     "best stopband": Style("#065dcb", "-", "*"),
     "best at f/2": Style("#088a40", (0, (8, 3)), "P", "#077a39"),
     "robust to lamps": Style("#540fcf", "-", "X"),

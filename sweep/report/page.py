@@ -23,6 +23,7 @@ from .pages import page, script
 from .panels import Picture
 from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .section import Section
+from .sections.clouds import Clouds
 from .sections.colors import Colors
 from .sections.curves import SensorCurves
 from .sections.deeper_reds import DeeperReds
@@ -56,6 +57,7 @@ ORDER: tuple[type[Section], ...] = (
         TradeOff,
         Scenes,
         Edges,
+        Clouds,
         DeeperReds,
         Tasks,
         Colors,

@@ -85,7 +85,7 @@ def report_sensors(manifest: Manifest, runs: Sequence[SensorRun]) -> list[str]:
     outputs = [(run.member, read_output(run.folder)) for run in runs]
     figures = pd.DataFrame([row for member, output in outputs for row in _figures(member, output)])
     column = outputs[0][1].trade_off[0]
-    words, summary = quantity(column), _summary(figures)
+    words, summary = quantity(column), _summary(figures, column.unit)
     n_found = figures.loc[figures["kind"] == SEARCHED, "cfa"].nunique()
     lines = [*_answer(summary, n_found, str(figures["reference"].iloc[0]), words)]
     answer, stated = lines[: max(n_found, 1)], holds_for(outputs[0][1], _curves(outputs))
@@ -106,7 +106,7 @@ def report_sensors(manifest: Manifest, runs: Sequence[SensorRun]) -> list[str]:
     links = [f"{run.folder.name}/{REPORT}" for run in runs]
     study = outputs[0][1].study
     lead = Told(
-        "By design", (), picture, table_of(summary.drop(columns=["more", "on", *_MORE.values()], errors="ignore"))
+        "By design", (), picture, table_of(summary.drop(columns=["more", "on", "dn", *_MORE.values()], errors="ignore"))
     )
     text = page_of(
         folder.name, study.title or study.question or folder.name, answer, stated, lead, sections,
@@ -188,7 +188,7 @@ def _uncertain(output: Output, separation: str) -> Mapping[Any, Mapping[str, flo
     return {key: {str(n): float(v) for n, v in row.items()} for key, row in known[names].iterrows()}
 
 
-def _summary(figures: pd.DataFrame) -> pd.DataFrame:
+def _summary(figures: pd.DataFrame, unit: str) -> pd.DataFrame:
     """Return a row per design, the searched ones first: ranges of both ratios, and where both are above 1."""
     figures, rows_of = figures.assign(last=figures["kind"] != SEARCHED).sort_values("last", kind="stable"), []
     for design, of_design in figures[figures["name"] != figures["reference"]].groupby("design", sort=False):
@@ -199,6 +199,7 @@ def _summary(figures: pd.DataFrame) -> pd.DataFrame:
             "with lights": len(of_design),
             "more": _verdict(of_design),
             "separation": _span(of_design["ratio"]),
+            "dn": f"{digits(of_design['dn'].min())} to {digits(of_design['dn'].max())} {unit}".rstrip(),
             "light": _span(of_design["light_ratio"]),
             "more of both": f"{int(more.sum())} of {len(of_design)}",
             **{words: _span(of_design[f"{key}_ratio"]) for key, words in _MORE.items() if f"{key}_ratio" in of_design},
@@ -217,7 +218,7 @@ def _answer(summary: pd.DataFrame, n_found: int, reference: str, words: str) -> 
         otherwise = "; ".join(f"{what} {row[what]}" for what in _MORE.values() if what in row)
         yield (
             f"**{row['more']}** on {row['on']}: the {row['design']} has **{row['separation']} times** the {words} of "
-            f"{reference} at {row['light']} times its light{f' ({otherwise})' if otherwise else ''}."
+            f"{reference} ({row['dn']}) at {row['light']} times its light{f' ({otherwise})' if otherwise else ''}."
         )
     for row in rows_of[:n_found]:
         sure = row.get("by 5 % quantiles", "")
@@ -233,13 +234,17 @@ def _together(table: pd.DataFrame, goal: Column) -> Iterator[str]:
     """Yield how much of the best of each sensor a filter for all keeps, and one that was designed without a sensor."""
     for space in dict.fromkeys(table["space"]):
         parts, of_space = [], table[table["space"] == space]
-        for designed_on in dict.fromkeys(of_space["designed_on"]):
-            filters = of_space[of_space["designed_on"] == designed_on]
-            shown = filters if designed_on == ALL else filters[filters["judged"]]
+        of_all, judged = of_space[of_space["designed_on"] == ALL], of_space[of_space["judged"]]
+        groups = {f"one {space} filter for {ALL}": (of_all, "")}
+        if judged["sensor"].nunique() > _MOST_NAMED:
+            groups["one for all but one"] = judged, " on that one"
+        else:
+            groups |= {
+                f"one for {name}": (own, " on that one") for name, own in judged.groupby("designed_on", sort=False)
+            }
+        for what, (shown, where) in groups.items():
             shares, broken = shown["objective"] / shown["own_best"], float(shown["violation"].max())
-            what = f"one {space} filter for {designed_on}" if designed_on == ALL else f"one for {designed_on}"
-            text = f"{what} keeps {shares.min():.0%} to {shares.max():.0%}"
-            text += " on that one" * (designed_on != ALL)
+            text = f"{what} keeps {shares.min():.0%} to {shares.max():.0%}{where}"
             parts.append(text + (f" and breaks a constraint by {broken:.2g} of its bound" if broken else ""))
         yield f"Of the best {goal.words} of each sensor and lights: {'; '.join(parts)}."
 
@@ -289,7 +294,7 @@ def _notes(outputs: Sequence[tuple[SensorAndLights, Output]]) -> Iterator[str]:
     origins = [origin for _, output in outputs for origin in (output.provenance.sensor, output.provenance.lights)]
     modeled = dict.fromkeys(origin.name for origin in origins if origin.surrogate)
     if modeled:
-        names = " and ".join(modeled)
+        names = " and ".join(modeled) if len(modeled) <= _MOST_NAMED else f"{len(modeled)} sensors and lamps"
         yield f"Note: the curves of {names} are surrogates, modeled from stated parameters, not measured."
 
 

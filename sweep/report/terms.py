@@ -154,5 +154,5 @@ def edges_in_words(edges: tuple[tuple[float, float], ...]) -> str:
 def bound_conditions(output: Output) -> str:
     """Return the constraints under which a search's upper bound holds, in words."""
     search = output.provenance.search
-    left_out = [] if search is None else [named(output, name) for name in search.limit_left_out]
+    left_out = [] if search is None else [named(output, name) for name in search.upper_bound_left_out]
     return f"under the same constraints{f' except {joined(left_out)}' if left_out else ''}"

@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from ..base.types import Array, Float, FloatArray, PerWavelength
 
-_QE, _LIGHT, _TASK, _DESIGN, _ON_FRONT, _LIMIT = "qe", "light", "task", "design", "front", "limit"
+_QE, _LIGHT, _TASK, _DESIGN, _ON_FRONT, _LIMIT = "qe", "light", "task", "design", "front", "upper_bound"
 _COLORANT = "colorant"
 """Kinds: of the sensor; of a signal; of an own task's file; a modified channel of a design that is drawn, or of one on
 the front; of the limit; the absorbance of a colorant, relative to its peak."""

@@ -9,7 +9,7 @@ from typing import get_args
 import pyarrow as pa
 
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
-from ..metrics.quantity import DN, Column, RequestedQuantities
+from ..metrics.quantity import DN, UPPER_BOUND, Column, RequestedQuantities
 from ..metrics.registry import listed
 from ..spectra.tasks import TaskColumns, TaskMetric
 from . import tables as files
@@ -36,16 +36,19 @@ _VERDICTS = {
         "violation",
     ): "largest violation of a constraint, relative to its bound; null where a constrained quantity is unknown",
     ("objective",): "the study's objective, where it is of several quantities",
-    ("limit", "gap"): "of the search's answer: what no filter exceeds (between the least transmission and the replaced "
-    "curve, same constraints, before clipping and quantization; a design may read a little more after rounding), and "
-    "how far below it the answer is",
-    ("pareto",): "not dominated in separation and sensitivity among the designs of its CFA and scenario that meet "
-    "every constraint but those on these two",
     (
-        "plan",
-        "promised_dn",
-    ): "how the scene was simulated (`provenance.json` says it in full), and a bound on what the effects that were "
-    "left out change in any CSD, also at the best sampling phase and with shifted edges",
+        UPPER_BOUND,
+        "gap",
+    ): "of the search's answer, in the unit of the objective: what no filter exceeds (between the least transmission "
+    "and the replaced curve, same constraints, before clipping and quantization; a design may read a little more after "
+    "rounding), and how far below it the answer is",
+    ("pareto",): "not in `results.parquet`, but in `pareto.parquet` and `designs.parquet`: not dominated in separation "
+    "and sensitivity among the designs of its CFA and scenario that meet every constraint but those on these two",
+    (
+        "simulation_key",
+        "omitted_effects_bound_dn",
+    ): "which effects and settings the scene was simulated with (`provenance.json` says them in full), and a bound on "
+    "what the effects that were left out change in any CSD, also at the best sampling phase and with shifted edges",
     ("status",): "`ok`, or the failure",
 }
 _WORST = (
@@ -60,7 +63,7 @@ _OF_A_SHARE = (
     "each), and with 95 % "
     "confidence (one-sided, binomial) that share of all, where the design was not chosen by the same draws, as a "
     "search's is: the mean of the draws that rank right below, a tenth of all that may have less, before clipping and "
-    "rounding, with all effects; no limit is computed of it, and a limit of others leaves a constraint on it out"
+    "rounding, with all effects; no upper bound is computed of it, and one of others leaves a constraint on it out"
 )
 _OWN = (
     "a metric of the study's `metrics`, the worst over moments and phases; its error is not checked: the tolerance in "
@@ -74,7 +77,7 @@ KEYS = tuple(name for names in (*_KEYS, *_VERDICTS) for name in names)
 def described(schema: pa.Schema, columns: Mapping[str, Column]) -> pa.Schema:
     """Return a schema whose fields carry `unit` and `meaning`, which pandas reads as `DataFrame.attrs`."""
     meanings = {name: text for names, text in (_KEYS | _VERDICTS).items() for name in names}
-    meanings |= {name: column.meaning for name, column in columns.items()}
+    meanings |= {name: column.meaning for name, column in columns.items() if column.meaning}
     units = {name: column.unit for name, column in columns.items()}
     attrs = {
         kind: {name: words[name] for name in schema.names if name in words}
@@ -158,11 +161,11 @@ FILES = {
     files.MAP: "where a search has a map, a row per pair of values: all parameters of the best design there, objective "
     "and sensitivity before clipping and quantization, `violation` and `feasible`; with `colorants.assumed` the "
     "concentration of a single absorption band in a film of 0.8 um, `mol_per_l` and `percent_by_weight`",
-    files.FRONT: "results of the search at each level of sensitivity, and the limit there; between two levels rows "
-    "with the limit alone: " + ", ".join(files.front_schema(["<parameters>"]).names),
+    files.FRONT: "results of the search at each level of sensitivity, and the upper bound there; between two levels "
+    "rows with the bound alone: " + ", ".join(files.front_schema(["<parameters>"]).names),
     files.TILES: "of a search over tiles, a row for each tile at each level of light (`cfa_sensitivity_min`; null: "
     "what the study itself needs): `space`, `cfa`, the curve that its modified pixel is made from (`base`), how many "
-    "`kinds` of pixels, its `status` (`searched`; `excluded`: its upper bound `limit` is no more than the best that "
+    "`kinds` of pixels, its `status` (`searched`; `excluded`: its `upper_bound` is no more than the best that "
     "was found; `too dark`; `impossible`: no filter meets the constraints), the best filter found in it, and of the "
     "`best` tile other separations of the same lamps, DN, as they are read out: "
     + ", ".join(files.tiles_schema(["<parameters>"]).names),

@@ -100,13 +100,14 @@ class CheckFacts(_Facts):
 
 
 class SearchFacts(_Facts):
-    """A search in figures; see `search.limit.Limit` for those of the limit.
+    """A search in figures; see `search.upper_bound.UpperBound` for those of the limit.
 
     `scenario`: of several (`scenarios`) the one in which the answer is worst. `cfa`, `channel`: the searched ones.
     `bounded`: kind and name of the spaces whose feasible filters the limit holds for, in that scenario.
     `refinement`: the algorithm that continued from the best point of all starts; `endings` has its status at the end.
     `scenes_added`: of a series, between its scenarios, where the worst value was found. `tiles`: of a search over
     tiles, how many became what; `tiles_limit`: the bound over all.
+    `upper_bound_of_box`: of filters that may exceed the replaced curve where the box does.
     """
 
     algorithm: str
@@ -122,20 +123,21 @@ class SearchFacts(_Facts):
     objective: str
     best_smooth_objective: float
     best_sensitivity: float
-    limit_attained: float | None
-    limit_proven: float | None
-    limit_left_out: tuple[str, ...]
-    limit_programs: int | None
-    limit_open_parts: int | None
-    front_limits_open: int
+    upper_bound_attained: float | None
+    upper_bound_proven: float | None
+    upper_bound_left_out: tuple[str, ...]
+    upper_bound_programs: int | None
+    upper_bound_open_parts: int | None
+    front_upper_bounds_open: int
     gap: float | None
-    no_limit: str | None
+    no_upper_bound: str | None
     front_evaluations: int
     combinations: tuple[str, ...] = ()
     refinement: str | None = None
     scenes_added: int = 0
     tiles: dict[str, int] = {}
     tiles_limit: float | None = None
+    upper_bound_of_box: bool = False
 
     @property
     def converged(self) -> bool:
@@ -167,6 +169,8 @@ class Provenance(_Facts):
     failed: int
     counts: tuple[tuple[str, str, str, str, bool, int], ...]
     plans: dict[str, PlanFacts]
+    seconds_of_effects: tuple[float, float] | None = None
+    """Time of all rows on one core as planned, and with every effect, s; where a bound leaves effects out."""
     check: CheckFacts | None = None
     trade_off: tuple[str, str]
     parameters: tuple[str, ...]

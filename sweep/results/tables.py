@@ -15,17 +15,18 @@ import pyarrow.parquet as pq
 
 from ..base.errors import OutputError, ValidationIssue
 from ..base.types import Bool, BoolArray
+from ..metrics.quantity import UPPER_BOUND
 from .atomic import atomic, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SCHEMA_VERSION = "3"
+SCHEMA_VERSION = "4"
 RGGB = "RGGB"
 """The plain CFA that others are compared with, where a study has it."""
 RESULTS, DESIGNS, PARETO = "results.parquet", "designs.parquet", "pareto.parquet"
 SEARCH_LOG = "search.parquet"
-FRONT = "front.parquet"
+FRONT = "search_front.parquet"
 CURVES = "curves.parquet"
 POINTS = "points.parquet"
 CROSSINGS = "crossings.parquet"
@@ -82,11 +83,11 @@ _SERIES = (pa.field("series", _TEXT), pa.field("key", _TEXT), pa.field("value", 
 _VERDICTS = (
     pa.field("violation", pa.float64()),
     pa.field("feasible", pa.bool_()),
-    pa.field("plan", _TEXT),
-    pa.field("promised_dn", pa.float64()),
+    pa.field("simulation_key", _TEXT),
+    pa.field("omitted_effects_bound_dn", pa.float64()),
     pa.field("status", _TEXT),
 )
-OF_SEARCH = ("limit", "gap")
+OF_SEARCH = (UPPER_BOUND, "gap")
 """Columns of the answers of a search."""
 ON_FRONT = "pareto"
 """Column of the rows that a report shows."""
@@ -147,7 +148,15 @@ def front_schema(parameters: Sequence[str]) -> pa.Schema:
     `cfa_sensitivity_min` is the same level for the whole CFA; null if several channels are modified.
     """
     number = pa.float64()
-    names = ("sensitivity_min", "cfa_sensitivity_min", "objective", "sensitivity", "cfa_sensitivity", "limit", "gap")
+    names = (
+        "sensitivity_min",
+        "cfa_sensitivity_min",
+        "objective",
+        "sensitivity",
+        "cfa_sensitivity",
+        "upper_bound",
+        "gap",
+    )
     fields = [pa.field(name, number) for name in (*names, *parameters)] + [pa.field("evaluations", pa.int64())]
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
@@ -157,7 +166,7 @@ def tiles_schema(parameters: Sequence[str]) -> pa.Schema:
     text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
     fields = [pa.field("cfa_sensitivity_min", number), *(pa.field(name, text) for name in ("space", "cfa", "base"))]
     fields += [pa.field("kinds", pa.int32()), pa.field("status", text), pa.field("best", pa.bool_())]
-    names = ("limit", "objective", "sensitivity", "cfa_sensitivity", *parameters, *COUNTED)
+    names = ("upper_bound", "objective", "sensitivity", "cfa_sensitivity", *parameters, *COUNTED)
     fields += [pa.field(name, number) for name in names]
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 

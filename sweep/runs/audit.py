@@ -26,7 +26,7 @@ from .check import compared_rows
 
 _SHARE = 0.01
 """Share of the rows that are audited beside the front, plain CFAs and named designs."""
-_KEYS = ("design_id", "filter_id", "scenario", "plan")
+_KEYS = ("design_id", "filter_id", "scenario", "simulation_key")
 _COLUMNS = (*_KEYS, "allowed_dn", "realized_dn", "quantity", "allowed_share", "realized_share", "other")
 
 

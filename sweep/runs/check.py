@@ -87,7 +87,7 @@ def _compared(study: Study, rules: Rules, space: Space, scenario: str, rows: Seq
     tolerance_dn = study.plans[scenario].tolerance_dn if study.plans else study.section.tolerance_dn
     allowed_dn = _allowed_dn(setup, tolerance_dn)
     own_s, reference_s = np.diff(times).tolist()
-    result = [{key: row[key] for key in ("design_id", "filter_id", "scenario", "plan")} for row in rows]
+    result = [{key: row[key] for key in ("design_id", "filter_id", "scenario", "simulation_key")} for row in rows]
     result = [row | {"own_s": own_s, "reference_s": reference_s} for row in result]
     in_dn = {name for name, of in compared.items() if of.unit == DN and of.pair is not None}
     for (what, realized, allowed), names in (

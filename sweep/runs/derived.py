@@ -29,7 +29,7 @@ from ..results.tables import (
     WORST,
     YIELDS,
 )
-from ..search.limit import Limit
+from ..search.upper_bound import UpperBound
 from ..study import Study
 from .allowed_lamps import ALLOWED_LAMPS
 from .analysis import Analysis
@@ -63,7 +63,7 @@ class DerivedInput:
     on_front: pd.DataFrame
     details: Mapping[int, Details]
     points: Int[IndexArray, " points"]
-    limit: Callable[[], Limit | None]
+    limit: Callable[[], UpperBound | None]
     parallel: Parallel
     kept: Callable[[str], Parallel]
     progress: Progress

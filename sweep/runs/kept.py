@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 from ..base.types import Call
 from ..results.answers import Answers
 from ..results.records import from_json, to_json
-from ..search.limit import Limit
+from ..search.upper_bound import UpperBound
 from .workers import Workers
 
 
@@ -45,7 +45,7 @@ class CachedCalls:
                 number, answer = next(fresh)
                 finished[missing[number]] = answer
                 self.answers.save(keys[missing[number]], to_json(answer))
-            if isinstance(finished[at], Limit):
+            if isinstance(finished[at], UpperBound):
                 self._limits.append(key)
             yield finished.pop(at)
 

@@ -18,6 +18,7 @@ from ..results.tables import PROVENANCE
 from ..spectra.builtin.measured_sets import BENKNER, LUXEON, SENSORS, MeasuredSet
 from ..spectra.builtin.registry import BUILT_IN_LIGHTS
 from ..spectra.builtin.spectra import cards
+from ..spectra.builtin.surrogate import FITS
 from ..spectra.builtin.surrogate_spectra import surrogate_cards
 from ..study import SensorAndLights, Study, folder_name, load_study, sensor_studies_in
 from ..study.shipped import shipped_folder, shipped_names
@@ -171,8 +172,10 @@ def list_data() -> Answer:
             f"  sha256: {card.sha256}",
         ]
     lines += [
-        f"Sensors: {', '.join(name for name in BUILT_IN_SENSORS if '/' not in name)}, rawtoaces/NAME; "
-        f"lights: {', '.join(BUILT_IN_LIGHTS)} (ar0820, tl16, tl16_deep_red, filament: surrogates).",
+        f"Sensors: {', '.join(name for name in BUILT_IN_SENSORS if not {*'/@'} & {*name})}, rawtoaces/NAME, "
+        f"ar0820@1 to ar0820@{FITS} (further fits of the surrogate, with their tl16); "
+        f"lights: {', '.join(name for name in BUILT_IN_LIGHTS if '@' not in name)} "
+        f"(ar0820, tl16, tl16_deep_red, filament: surrogates).",
         f"{total} spectra in {len(sets)} sets. A study's tasks name their groups: tasks: {{own: ...}}.",
     ]
     facts = [

@@ -137,9 +137,9 @@ def rules_of(study: Study) -> Rules:
     axes, searched = axes_of(study.scenarios), study.search is not None
     return Rules(
         places=places_of(study.scenarios),
-        schema=described(result_schema(study.parameters, list(swept), searched=searched, axes=axes), quantities),
+        schema=described(result_schema(study.parameters, list(swept), searched=searched, axes=axes), study.columns),
         shown=described(
-            result_schema(study.parameters, list(quantities), marked=True, searched=searched, axes=axes), quantities
+            result_schema(study.parameters, list(quantities), marked=True, searched=searched, axes=axes), study.columns
         ),
         requested=study.requested,
         objective=study.objective,
@@ -259,7 +259,7 @@ def _table(at: Rows, rules: Rules, schema: pa.Schema, values: Mapping[str, Any])
     if space.kind != SWEPT:
         known["name"] = known["space"]
     if plan is not None:
-        known |= {"plan": _word(plan.key, n), "promised_dn": np.full(n, plan.error_bound_dn)}
+        known |= {"simulation_key": _word(plan.key, n), "omitted_effects_bound_dn": np.full(n, plan.error_bound_dn)}
 
     def column(field: pa.Field) -> pa.Array:
         values_of_field = known.get(field.name)

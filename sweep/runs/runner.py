@@ -47,14 +47,15 @@ from ..results.tables import (
     word_mask,
 )
 from ..search.combinations import numbers_of
-from ..search.limit import Limit
 from ..search.problem import CONVERGED
+from ..search.upper_bound import UpperBound
 from ..study import Study
 from ..study.goals import refuse_unreachable
 from ..vision.installed import require_network
 from .check import check_run
 from .derived import DerivedInput, row_tables
 from .details import design_details
+from .dry_run import seconds_of_effects
 from .held_out import left_out_table
 from .kept import CachedCalls
 from .provenance import plan_facts, provenance, resolved_yaml
@@ -297,15 +298,15 @@ class _Run:
             filters = np.where(ids >= self.study.n_designs, self.study.n_filters, ids % max(1, self.study.n_filters))
             at = table.column_names.index("design_id") + 1
             table = table.add_column(at, "filter_id", pa.array(filters, pa.int64(), from_pandas=True))
-        self.manifest.write_table(name, table.cast(described(table.schema, self.study.quantities)))
+        self.manifest.write_table(name, table.cast(described(table.schema, self.study.columns)))
 
-    def _limit(self) -> Limit | None:
+    def _limit(self) -> UpperBound | None:
         """Return the upper bound of a search in one scenario, computed alone if the search need not be repeated."""
         search = self.study.search
         if search is not None and (len(search.scenarios) > 1 or search.tiles):
             return None
         if "answer" in self.__dict__ or self.study.search is None:
-            return None if self.answer is None else self.answer.limit
+            return None if self.answer is None else self.answer.upper_bound
         return limit_alone(self.study, self.study.search)
 
     def _provenance(self) -> Provenance:
@@ -336,6 +337,7 @@ class _Run:
                 warnings.append("pixels may saturate: the search sees them before clipping, its row after")
         duration_s = round(time.monotonic() - self.started, 3)
         seconds = max(_CHECK_S, _CHECK_SHARE * duration_s)
+        facts["seconds_of_effects"] = seconds_of_effects(study)
         facts["check"], unchecked = check_run(study, self.manifest.folder, seconds, self.pool)
         how = self.how | {"duration_s": duration_s}
         return Provenance(**provenance(study, how), **facts, warnings=(*warnings, *unchecked))

@@ -20,10 +20,10 @@ from ..results.tables import front_schema, search_schema
 from ..search.certificate import ROUNDING
 from ..search.combinations import Choice, choose, numbers_of, with_members
 from ..search.held import search_cells
-from ..search.limit import Limit, limit_of, reason_without_bound
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from ..search.solver import extreme_value, refinement_of, search_from, smooth_objective
 from ..search.trade_off import Effort, FrontPoint, calls_at_levels, check_proof, gap_of, trade_off
+from ..search.upper_bound import UpperBound, reason_without_bound, upper_bound_of
 from ..study import Search, Study
 from ..study.axes import series_of
 from .as_read import Reading, best_as_read
@@ -53,8 +53,8 @@ class SearchAnswer:
     scenario: str
     runs: tuple[SearchRun, ...]
     best: Evaluation
-    limit: Limit | None
-    no_limit: str | None
+    upper_bound: UpperBound | None
+    no_upper_bound: str | None
     front: tuple[FrontPoint, ...]
     choice: Choice | None = None
     refinement: str | None = None
@@ -64,7 +64,7 @@ class SearchAnswer:
     @property
     def gap(self) -> float | None:
         """Relative distance of the answer below the proven upper bound."""
-        return None if self.limit is None else gap_of(self.best, self.limit)
+        return None if self.upper_bound is None else gap_of(self.best, self.upper_bound)
 
 
 def run_search(study: Study, search: Search, rules: Rules, parallel: Parallel, progress: Progress) -> SearchAnswer:
@@ -88,13 +88,13 @@ def run_search(study: Study, search: Search, rules: Rules, parallel: Parallel, p
         starts[0] = problem.to_unit(choice.tried[choice.best].x)
     per_start = search.max_evaluations // n_starts
     effort = Effort(search.algorithm, starts, per_start, study.section.seed, refinement)
-    no_limit, series = reason_without_bound(problem), len(search.scenarios) > 1
-    limited = no_limit is None and not series
+    no_upper_bound, series = reason_without_bound(problem), len(search.scenarios) > 1
+    limited = no_upper_bound is None and not series
     # All at once, so that no core waits for another: few of these calls need results of others.
     calls = [
         delayed(search_from, problem, i, u, search.algorithm, per_start, effort.seed) for i, u in enumerate(starts)
     ]
-    calls += [delayed(limit_of, problem)] if limited else []
+    calls += [delayed(upper_bound_of, problem)] if limited else []
     answers = parallel([*calls, *calls_at_levels(problem, search.levels, effort, limited=limited)])
     runs: list[SearchRun] = []
     for run in islice(answers, n_starts):
@@ -116,9 +116,9 @@ def run_search(study: Study, search: Search, rules: Rules, parallel: Parallel, p
     if series:
         alone = [problem.in_scenario(number) for number in range(len(search.scenarios))]
         worst = int(np.argmin([smooth_objective(scene_problem, best.x) for scene_problem in alone]))
-        no_limit = reason_without_bound(alone[worst])
+        no_upper_bound = reason_without_bound(alone[worst])
         # No filter's worst value is above the bound of any one scenario.
-        limit = next(iter(parallel([delayed(limit_of, alone[worst])]))) if no_limit is None else None
+        limit = next(iter(parallel([delayed(upper_bound_of, alone[worst])]))) if no_upper_bound is None else None
     check_proof(best, limit)
     front = trade_off(problem, search.levels, effort, answers, parallel, progress, limited=limited)
     return SearchAnswer(
@@ -127,7 +127,7 @@ def run_search(study: Study, search: Search, rules: Rules, parallel: Parallel, p
         tuple(runs),
         best,
         limit,
-        no_limit,
+        no_upper_bound,
         front,
         choice,
         refinement,
@@ -190,13 +190,13 @@ def _worst_scenes(
     return minima_between(or_nan(value), numbers)
 
 
-def limit_alone(study: Study, search: Search) -> Limit | None:
+def limit_alone(study: Study, search: Search) -> UpperBound | None:
     """Compute the upper bound of `run_search` without a search.
 
     None if there is no upper bound.
     """
     problem = study.problem(search)
-    return limit_of(problem) if reason_without_bound(problem) is None else None
+    return upper_bound_of(problem) if reason_without_bound(problem) is None else None
 
 
 def _infeasible(study: Study, problem: Problem, starts: Float[Array, "starts free"], per_start: int) -> InfeasibleError:
@@ -225,11 +225,11 @@ def answer_rows(study: Study, answer: SearchAnswer, rules: Rules, parallel: Para
     ]
     # Workers have loaded what this takes, and this process has not.
     rows = parallel([delayed(rows_of, job, study.setup(best, job.scenario), rules, rules.wanted) for job in jobs])
-    proven = None if answer.limit is None else answer.limit.proven
+    proven = None if answer.upper_bound is None else answer.upper_bound.proven
     tables: list[pa.Table] = []
     for job, row in zip(jobs, rows, strict=True):
         tables.append(row)
-        bound = {"limit": proven, "gap": answer.gap} if job.scenario == answer.scenario else {}
+        bound = {"upper_bound": proven, "gap": answer.gap} if job.scenario == answer.scenario else {}
         for name, value in {"space": space.name, **bound}.items():
             index, kind = row.schema.get_field_index(name), row.schema.field(name)
             tables[-1] = tables[-1].set_column(index, kind, pa.array([value]).cast(kind.type))
@@ -238,7 +238,7 @@ def answer_rows(study: Study, answer: SearchAnswer, rules: Rules, parallel: Para
 
 def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
     """Return the search in figures, for provenance and summary."""
-    search, space, limit = answer.search, answer.search.space, answer.limit
+    search, space, limit = answer.search, answer.search.space, answer.upper_bound
     return {
         "algorithm": search.algorithm,
         "scenario": answer.scenario,
@@ -255,14 +255,17 @@ def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
         "objective": str(study.objective),
         "best_smooth_objective": answer.best.objective,
         "best_sensitivity": answer.best.sensitivity,
-        "limit_attained": None if limit is None or limit.curve is None else limit.attained,
-        "limit_proven": None if limit is None else limit.proven,
-        "limit_left_out": [] if limit is None else list(limit.left_out),
-        "limit_programs": None if limit is None else limit.programs,
-        "limit_open_parts": None if limit is None else limit.open_parts,
-        "front_limits_open": sum(p.limit is not None and p.limit.open_parts > 0 for p in answer.front),
+        "upper_bound_attained": None if limit is None or limit.curve is None else limit.attained,
+        "upper_bound_proven": None if limit is None else limit.proven,
+        "upper_bound_left_out": [] if limit is None else list(limit.left_out),
+        "upper_bound_programs": None if limit is None else limit.programs,
+        "upper_bound_open_parts": None if limit is None else limit.open_parts,
+        "front_upper_bounds_open": sum(
+            p.upper_bound is not None and p.upper_bound.open_parts > 0 for p in answer.front
+        ),
+        "upper_bound_of_box": limit is not None and limit.of_box,
         "gap": answer.gap,
-        "no_limit": answer.no_limit,
+        "no_upper_bound": answer.no_upper_bound,
         "combinations": [] if answer.choice is None else list(answer.choice.counts),
         "front_evaluations": sum(len(run.log) for point in answer.front for run in point.runs),
     }
@@ -375,12 +378,14 @@ def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
             row |= {"objective": point.best.objective, "sensitivity": point.best.sensitivity}
             row["cfa_sensitivity"] = point.best.cfa_sensitivity
             row |= dict(zip(names, map(float, point.best.x), strict=True))
-        if point.limit is not None and np.isfinite(point.limit.proven):
-            row["limit"] = point.limit.proven
-            row["gap"] = None if point.best is None else gap_of(point.best, point.limit)
+        if point.upper_bound is not None and np.isfinite(point.upper_bound.proven):
+            row["upper_bound"] = point.upper_bound.proven
+            row["gap"] = None if point.best is None else gap_of(point.best, point.upper_bound)
         rows.append(row)
         for sensitivity, proven in point.onward:
             if np.isfinite(proven):
                 cfa_sensitivity = cfa_sensitivity_at(setup, sensitivity)
-                rows.append({"sensitivity_min": sensitivity, "cfa_sensitivity_min": cfa_sensitivity, "limit": proven})
+                rows.append(
+                    {"sensitivity_min": sensitivity, "cfa_sensitivity_min": cfa_sensitivity, "upper_bound": proven}
+                )
     return pa.Table.from_pylist(rows, schema=front_schema(names))

@@ -13,11 +13,11 @@ from ..base.types import Parallel, Progress, delayed
 from ..camera.model import SceneModel
 from ..metrics.evaluate import evaluate_some
 from ..results.tables import COUNTED, front_schema, tiles_schema
-from ..search.limit import limit_of, reason_without_bound
 from ..search.problem import Problem, best_feasible, starting_points
 from ..search.solver import search_from
 from ..search.tiles import SEARCHED, Tiles, search_tiles
 from ..search.trade_off import Effort, check_proof
+from ..search.upper_bound import reason_without_bound, upper_bound_of
 from ..spectra.lights import pair_name
 from ..study import Search, Study
 from .as_read import Reading, best_as_read
@@ -55,19 +55,23 @@ def run_tile_search(study: Study, search: Search, rules: Rules, parallel: Parall
         said = f"{study.name}: no feasible design was found in any of {len(problems)} tiles"
         raise InfeasibleError([ValidationIssue(said, key="constraints", value=wanted)])
     problem = problems[winner]
-    no_limit = reason_without_bound(problem)
+    no_upper_bound = reason_without_bound(problem)
     points = [*starts, problem.to_unit(found.x)]
     calls = [
         delayed(search_from, problem, i, u, search.algorithm, per_start, effort.seed) for i, u in enumerate(points)
     ]
-    *runs, limit = parallel([*calls, delayed(limit_of, problem)]) if no_limit is None else (*parallel(calls), None)
+    *runs, limit = (
+        parallel([*calls, delayed(upper_bound_of, problem)]) if no_upper_bound is None else (*parallel(calls), None)
+    )
     best = best_feasible([found, *(e for run in runs for e in run.log)])
     assert best is not None
     of_best = replace(search, space=search.tiles[winner], tiles=())
     run = best_as_read(problem, Reading.of(study, of_best, rules), runs, effort, progress)
     runs, best = (runs, best) if run is None else ([*runs, run], run.log[-1])
     check_proof(best, limit)
-    answer = SearchAnswer(of_best, search.scenario, tuple(runs), best, limit, no_limit, front=(), starts=len(starts))
+    answer = SearchAnswer(
+        of_best, search.scenario, tuple(runs), best, limit, no_upper_bound, front=(), starts=len(starts)
+    )
     return TileAnswer(answer, search, problems, tiles)
 
 
@@ -87,7 +91,7 @@ def tiles_table(study: Study, found: TileAnswer) -> pa.Table:
                 "base": base,
                 "kinds": len(setup.camera.mosaic.channels),
                 "status": tile.status(-np.inf if best is None else best.objective),
-                "limit": tile.limit if np.isfinite(tile.limit) else None,
+                "upper_bound": tile.upper_bound if np.isfinite(tile.upper_bound) else None,
                 "best": i == winner,
             }
             if tile.best is not None:
@@ -114,13 +118,15 @@ def tile_front_table(found: TileAnswer) -> pa.Table:
     """Return the best filter over all tiles at each level of light, with the upper bound over all tiles."""
     names, rows = found.search.space.parameters, list[dict[str, Any]]()
     for number, level in enumerate(found.tiles.levels[1:], 1):
-        best, proven = found.tiles.best(number), found.tiles.limit(number)
+        best, proven = found.tiles.best(number), found.tiles.upper_bound(number)
         row: dict[str, Any] = {"cfa_sensitivity_min": level}
         if best is not None:
             row |= {"objective": best.objective, "sensitivity": best.sensitivity}
             row |= {"cfa_sensitivity": best.cfa_sensitivity} | dict(zip(names, map(float, best.x), strict=True))
         if np.isfinite(proven):
-            row |= {"limit": proven} | ({} if best is None or proven <= 0 else {"gap": 1 - best.objective / proven})
+            row |= {"upper_bound": proven} | (
+                {} if best is None or proven <= 0 else {"gap": 1 - best.objective / proven}
+            )
         rows.append(row)
     return pa.Table.from_pylist(rows, schema=front_schema(names))
 
@@ -130,7 +136,7 @@ def tile_facts(found: TileAnswer) -> dict[str, Any]:
     tiles, best = found.tiles, found.tiles.best(0)
     assert best is not None
     of_each = [tile.status(best.objective) for tile in tiles.at[0]]
-    proven = tiles.limit(0)
+    proven = tiles.upper_bound(0)
     return {
         "tiles": {status: of_each.count(status) for status in dict.fromkeys((SEARCHED, *of_each))},
         "tiles_limit": proven if np.isfinite(proven) else None,

@@ -1,12 +1,12 @@
 """All filters that a study allows as a linear program, with bounds that hold for any tolerance of the solver.
 
-A filter N lies between the least transmission and the base curve and meets constraints on slope and sensitivities:
-rows a @ N >= h(t), where t is the value that the objective is to reach. A pair of signals with a decided side is one
-more row: the difference of its responses in the modified channel. Weights y >= 0 of the rows give a bound that holds
-for any y: a filter that reaches t has y @ A N >= y @ h(t), but no filter of the box has more than V(y), the sum over
-the wavelengths of the larger of (A' y) low and (A' y) high. So no filter reaches a t with y @ h(t) > V(y). The
-solver's dual values only make it tight (Neumaier and Shcherbina, "Safe bounds in linear and mixed-integer linear
-programming", Math. Program. 99, 2004).
+A filter N lies between the least transmission and the base curve (or the box, where that reaches above it) and meets
+constraints on slope and sensitivities: rows a @ N >= h(t), where t is the value that the objective is to reach. A pair
+of signals with a decided side is one more row: the difference of its responses in the modified channel. Weights y >= 0
+of the rows give a bound that holds for any y: a filter that reaches t has y @ A N >= y @ h(t), but no filter of the box
+has more than V(y), the sum over the wavelengths of the larger of (A' y) low and (A' y) high. So no filter reaches a t
+with y @ h(t) > V(y). The solver's dual values only make it tight (Neumaier and Shcherbina, "Safe bounds in linear and
+mixed-integer linear programming", Math. Program. 99, 2004).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ..metrics.columns.sensitivity import SENSITIVITY
 from .certificate import ROUNDING, Certificate, LinearSolution, Sides
 from .cuts import Pool
 from .least_noise import least_variance
-from .perturbed import Distances
+from .perturbed import Distances, highest
 from .problem import Problem
 
 _SUM_ROUNDING = 1e-12
@@ -68,16 +68,16 @@ class FilterProgram:
         self.base = problem.setup.camera.base_qe[0]
         bound = problem.constraints.get("min_transmission", Bound(min=0.0))
         least = bound.min or 0.0
-        self.low = self.base * least
-        self._box = self.base * (least - FEASIBLE * bound.scale - ROUNDING), self.base * (1 + ROUNDING)
+        self.low, self.high = self.base * least, highest(problem)
+        self._box = self.base * (least - FEASIBLE * bound.scale - ROUNDING), self.high * (1 + ROUNDING)
         self._rows, self._per_sensitivity = self._fixed_rows()
         self._set_pairs()
         objective = self._rows.rate > 0
         ends = (self._rows.matrix @ self._box[1] + self._rows.constant)[objective] / self._rows.rate[objective]
         self.top = float(min(ends.min(initial=np.inf), self.reach.max(axis=1, initial=-np.inf).min(initial=np.inf)))
         self._keep(np.flatnonzero(self.needed(max(self.top, 0.0)) > 0))
-        own_sizes = np.abs(self.differences) @ self.base + np.abs(self.added).max(axis=1, initial=0.0)
-        self._sizes = abs(self._rows.matrix) @ self.base, own_sizes
+        own_sizes = np.abs(self.differences) @ self.high + np.abs(self.added).max(axis=1, initial=0.0)
+        self._sizes = abs(self._rows.matrix) @ self.high, own_sizes
         self.solved = 0
 
     def _fixed_rows(self) -> tuple[_Rows, PerRow]:
@@ -245,7 +245,7 @@ class FilterProgram:
             c=np.append(np.zeros(self.base.size), -1.0),
             A_ub=hstack([-rows, csr_matrix(rate[:, None])]).tocsr(),
             b_ub=-floor,
-            bounds=np.column_stack([np.append(self.low, -np.inf), np.append(self.base, self.top + 1.0)]),
+            bounds=np.column_stack([np.append(self.low, -np.inf), np.append(self.high, self.top + 1.0)]),
             method="highs",
             options={"primal_feasibility_tolerance": _SOLVER_TOLERANCE},
         )

@@ -18,6 +18,7 @@ import numpy as np
 from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int, PerParameter, PerWavelength
 from ..designs.family import Family, MovedFamily
 from ..designs.tolerance import AS_DESIGNED
+from .certificate import ROUNDING
 from .problem import Problem
 
 _LEAST_BASE_TRANSMISSION = 1e-3
@@ -93,6 +94,20 @@ def perturbed_filters(problem: Problem) -> tuple[PerturbedFilter, ...]:
     """Return the filters as produced that a program knows: as designed, and moved by whole steps."""
     anywhere = problem.setup.all_heights or problem.setup.all_phases
     return (_as_designed(problem.setup.camera.base_qe[0]), *(() if anywhere else _moves(problem)))
+
+
+def highest(problem: Problem) -> PerWavelength:
+    """Return the most that filters of the problem have: the replaced curve, or the box where it reaches above that."""
+    base = np.asarray(problem.setup.camera.base_qe[0], dtype=float)
+    if not reaches_above(problem):
+        return base
+    return np.asarray(np.maximum(base, problem.family.upper(problem.low, problem.high)[0]), dtype=float)
+
+
+def reaches_above(problem: Problem) -> bool:
+    """Return whether filters of the box may exceed the curve that they replace."""
+    top = problem.family.upper(problem.low, problem.high)[0]
+    return bool((top > problem.setup.camera.base_qe[0] * (1 + ROUNDING)).any())
 
 
 def all_ways(problem: Problem) -> bool:

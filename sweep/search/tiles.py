@@ -15,10 +15,10 @@ from ..base.types import Array, Float, Parallel, Progress, delayed
 from ..camera.setup import Setup
 from ..metrics.bound import Bound
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, cfa_sensitivity_at
-from .limit import check_bound, limit_of, reason_without_bound
 from .problem import Evaluation, Problem
 from .solver import search_from, smooth_evaluation
 from .trade_off import Effort, with_least
+from .upper_bound import check_bound, reason_without_bound, upper_bound_of
 
 _BOUND_DN, _PROGRAMS, _MORE_PROGRAMS = 0.5, 100, 400
 """Width of the bounds, and linear programs for the bound of each tile, and for the highest ones."""
@@ -43,7 +43,7 @@ class TileAtLevel:
     """
 
     sensitivity: float
-    limit: float
+    upper_bound: float
     exact: bool
     best: Evaluation | None = None
     is_searched: bool = False
@@ -54,7 +54,7 @@ class TileAtLevel:
             return SEARCHED
         if self.sensitivity > 1:
             return DARK
-        return IMPOSSIBLE if self.limit == -np.inf else EXCLUDED if self.limit <= best else "not searched"
+        return IMPOSSIBLE if self.upper_bound == -np.inf else EXCLUDED if self.upper_bound <= best else "not searched"
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,9 @@ class Tiles:
         winner = self.winners[level]
         return None if winner is None else self.at[level][winner].best
 
-    def limit(self, level: int) -> float:
+    def upper_bound(self, level: int) -> float:
         """Return the upper bound over all tiles."""
-        return max(tile.limit for tile in self.at[level])
+        return max(tile.upper_bound for tile in self.at[level])
 
 
 def search_tiles(
@@ -93,13 +93,13 @@ def search_tiles(
     tiles = [[_at_level(problem, level) for problem in problems] for level in all_levels]
     _bound_all(problems, tiles, parallel, progress)
     searches = _Searches(problems, tiles, effort)
-    total = sum(tile.limit > -np.inf for row in tiles for tile in row)
+    total = sum(tile.upper_bound > -np.inf for row in tiles for tile in row)
     while True:
         calls, applied = [], list[tuple[int, int]]()
         for level, row in enumerate(tiles):
             best = searches.best_value(level)
-            waiting = [i for i, tile in enumerate(row) if not tile.is_searched and tile.limit > best]
-            for i in sorted(waiting, key=lambda i: (-row[i].limit, i))[:_AT_ONCE]:
+            waiting = [i for i, tile in enumerate(row) if not tile.is_searched and tile.upper_bound > best]
+            for i in sorted(waiting, key=lambda i: (-row[i].upper_bound, i))[:_AT_ONCE]:
                 calls.append(delayed(_searched, searches.problem(level, i), searches.starts(level, i), effort.seed))
                 applied.append((level, i))
         if not calls:
@@ -107,7 +107,9 @@ def search_tiles(
         for (level, i), answer in zip(applied, parallel(calls), strict=True):
             tiles[level][i].is_searched = True
             searches.take(level, i, answer)
-        left = sum(not t.is_searched and t.limit > searches.best_value(k) for k, row in enumerate(tiles) for t in row)
+        left = sum(
+            not t.is_searched and t.upper_bound > searches.best_value(k) for k, row in enumerate(tiles) for t in row
+        )
         progress("tiles at all levels of light", total - left, total)
     searches.polish(parallel, (0,), _POLISHED_FIRST)
     searches.polish(parallel, range(1, len(all_levels)), _POLISHED)
@@ -141,7 +143,7 @@ class _Searches:
         """Keep a filter of a tile, if it is the best one."""
         at = self.tiles[level][tile]
         if best.feasible and (at.best is None or best.objective > at.best.objective):
-            check_bound(best.objective, at.limit)
+            check_bound(best.objective, at.upper_bound)
             at.best = best
 
     def value(self, level: int, tile: int) -> float:
@@ -202,20 +204,25 @@ class _Searches:
             top = values.index(max(values))
             best = row[top].best
             for i in self._alike(top):
-                if best is not None and row[i].limit >= best.objective * (1 - _TIE_SHARE):
+                if best is not None and row[i].upper_bound >= best.objective * (1 - _TIE_SHARE):
                     self.take(level, i, smooth_evaluation(self.problem(level, i), best.x))
 
     def tighten(self, parallel: Parallel) -> None:
         """Compute the highest bounds of each level at its own light, a few times; all of them hold anyway."""
         for _ in range(_TIGHTENED):
-            limits = [[tile.limit for tile in row] for row in self.tiles]
+            limits = [[tile.upper_bound for tile in row] for row in self.tiles]
             highest = [(k, row.index(max(row))) for k, row in enumerate(limits)]
-            loose = [(k, i) for k, i in highest if not self.tiles[k][i].exact and np.isfinite(self.tiles[k][i].limit)]
+            loose = [
+                (k, i) for k, i in highest if not self.tiles[k][i].exact and np.isfinite(self.tiles[k][i].upper_bound)
+            ]
             if not loose:
                 return
-            calls = [delayed(limit_of, self.problem(k, i), _BOUND_DN, _MORE_PROGRAMS) for k, i in loose]
+            calls = [delayed(upper_bound_of, self.problem(k, i), _BOUND_DN, _MORE_PROGRAMS) for k, i in loose]
             for (k, i), limit in zip(loose, parallel(calls), strict=True):
-                self.tiles[k][i].limit, self.tiles[k][i].exact = min(self.tiles[k][i].limit, limit.proven), True
+                self.tiles[k][i].upper_bound, self.tiles[k][i].exact = (
+                    min(self.tiles[k][i].upper_bound, limit.proven),
+                    True,
+                )
 
     def winner(self, level: int) -> int | None:
         """Return the best tile; of equal ones that with more light, then with fewer kinds of pixels."""
@@ -254,7 +261,7 @@ def _bound_all(
     groups: dict[Hashable, list[tuple[int, int]]] = {}
     for level, row in enumerate(tiles):
         for i, tile in enumerate(row):
-            if tile.limit > -np.inf and bounded[i]:
+            if tile.upper_bound > -np.inf and bounded[i]:
                 groups.setdefault(_kind(problems[i]), []).append((level, i))
     calls, whose = [], []
     for members in groups.values():
@@ -262,13 +269,13 @@ def _bound_all(
         darkest = next(i for level, i in members if tiles[level][i].sensitivity == needed[0])
         problem = _without_light(problems[darkest])
         problem = problem if needed[0] <= 0 else with_least(problem, SENSITIVITY, needed[0])
-        calls.append(delayed(limit_of, problem, _BOUND_DN, _PROGRAMS, needed))
+        calls.append(delayed(upper_bound_of, problem, _BOUND_DN, _PROGRAMS, needed))
         whose.append((members, needed))
     for number, ((members, needed), limit) in enumerate(zip(whose, parallel(calls), strict=True), 1):
         for level, i in members:
             tile = tiles[level][i]
             at = needed.index(tile.sensitivity)
-            tile.limit = limit.proven if at == 0 else min(limit.proven, limit.elsewhere[at])
+            tile.upper_bound = limit.proven if at == 0 else min(limit.proven, limit.elsewhere[at])
             tile.exact = at == 0
         progress("upper bounds of tiles", number, len(calls))
 

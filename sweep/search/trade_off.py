@@ -12,9 +12,9 @@ import numpy as np
 from ..base.types import Array, Call, Float, Parallel, Progress, delayed
 from ..metrics.bound import Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
-from .limit import Limit, check_bound, gap_between, limit_of
 from .problem import Evaluation, Problem, SearchRun, best_feasible
 from .solver import search_from
+from .upper_bound import UpperBound, check_bound, gap_between, upper_bound_of
 
 _FRONT_STARTS = 2
 _FRONT_LIMIT_DN = 0.02
@@ -36,7 +36,7 @@ class FrontPoint:
     level: float
     best: Evaluation | None
     runs: tuple[SearchRun, ...]
-    limit: Limit | None
+    upper_bound: UpperBound | None
     onward: tuple[tuple[float, float], ...] = ()
 
 
@@ -54,7 +54,7 @@ class Effort:
     refinement: str | None = None
 
 
-def check_proof(best: Evaluation | None, limit: Limit | None, where: str = "") -> None:
+def check_proof(best: Evaluation | None, limit: UpperBound | None, where: str = "") -> None:
     """Raise an error if a design of the search exceeds the upper bound.
 
     Raises UpperBoundExceededError if it does.
@@ -63,7 +63,7 @@ def check_proof(best: Evaluation | None, limit: Limit | None, where: str = "") -
         check_bound(best.objective, limit.proven, where)
 
 
-def gap_of(best: Evaluation, limit: Limit) -> float | None:
+def gap_of(best: Evaluation, limit: UpperBound) -> float | None:
     """Return the relative gap of an answer to the upper bound.
 
     None if the bound is within its own accuracy of 0.
@@ -79,7 +79,7 @@ def calls_at_levels(problem: Problem, levels: Sequence[float], effort: Effort, *
     between = _between(levels)
     around = [(*before, *after) for before, after in zip([(), *between], [*between, ()], strict=True)]
     calls = zip(at_level, around, strict=True) if limited else ()
-    limits = [delayed(limit_of, p, _FRONT_LIMIT_DN, _FRONT_PROGRAMS, level_problem) for p, level_problem in calls]
+    limits = [delayed(upper_bound_of, p, _FRONT_LIMIT_DN, _FRONT_PROGRAMS, level_problem) for p, level_problem in calls]
     return [
         *limits,
         *(
@@ -111,7 +111,7 @@ def trade_off(
 
     Returns one point per level. Raises UpperBoundExceededError if a design exceeds its upper bound.
     """
-    limits: list[Limit | None] = [*islice(answers, len(levels))] if limited else [None] * len(levels)
+    limits: list[UpperBound | None] = [*islice(answers, len(levels))] if limited else [None] * len(levels)
     runs: list[list[SearchRun]] = [[] for _ in levels]
     done, total = 0, 2 * len(levels)
 
@@ -140,7 +140,7 @@ def trade_off(
     onward = [*_tangents(_between(levels), limits), ()]
     front = tuple(FrontPoint(level, best(k), tuple(runs[k]), limits[k], onward[k]) for k, level in enumerate(levels))
     for point in front:
-        check_proof(point.best, point.limit, f" at a sensitivity of {point.level:g} and more")
+        check_proof(point.best, point.upper_bound, f" at a sensitivity of {point.level:g} and more")
     return front
 
 
@@ -156,7 +156,7 @@ def _between(levels: Sequence[float]) -> list[tuple[float, ...]]:
 
 
 def _tangents(
-    between: Sequence[tuple[float, ...]], limits: Sequence[Limit | None]
+    between: Sequence[tuple[float, ...]], limits: Sequence[UpperBound | None]
 ) -> Iterator[tuple[tuple[float, float], ...]]:
     """Yield the smaller bound of both neighboring proofs at the sensitivities between them."""
     for levels, (below, above) in zip(between, pairwise(limits), strict=True):

@@ -35,7 +35,7 @@ PLANCK_J_S = 6.62607015e-34
 LIGHT_M_S = 299792458.0
 """Speed of light in vacuum, exact in the SI."""
 LARGEST = 1e100
-"""Limit of a curve's values, in any unit. Products of larger values overflow."""
+"""UpperBound of a curve's values, in any unit. Products of larger values overflow."""
 LEAST_PEAK = 1e-100
 """Least peak of a curve that is not 0; its other values may be as small as they like."""
 _GRID_SLACK = 1e-9

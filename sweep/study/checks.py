@@ -57,6 +57,12 @@ def check_lights(
         of_images = section.pixel, section.scenarios, lights, mosaics, section.wavelengths
         yield from vision_faults(section.vision, *of_images)
     yield from _check_published(section, lights, mosaics)
+    for cfa, channels in section.clouds.items():
+        if cfa not in mosaics:
+            yield unknown(("clouds", cfa), "CFA", cfa, mosaics)
+        for at, channel in enumerate(channels if cfa in mosaics else ()):
+            if channel not in mosaics[cfa].channels:
+                yield unknown(("clouds", cfa, at), f"channel of {cfa}", channel, mosaics[cfa].channels)
     yield from _check_captures(section, mosaics)
 
 

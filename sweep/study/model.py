@@ -25,7 +25,7 @@ from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
 from ..metrics.columns.tasks import PREFIX
 from ..metrics.objective import Objective, columns_of
-from ..metrics.quantity import DN, Quantity, RequestedQuantities
+from ..metrics.quantity import DN, UPPER_BOUND, Column, Quantity, RequestedQuantities
 from ..metrics.separation import csd_name
 from ..metrics.user_metrics import UserMetric
 from ..search.problem import Problem
@@ -148,6 +148,18 @@ class Study:
     def parameters(self) -> tuple[str, ...]:
         """Parameters of all families of the study, each once."""
         return tuple(dict.fromkeys(name for space in self.spaces for name in space.parameters))
+
+    @property
+    def columns(self) -> Mapping[str, Column]:
+        """Columns of the result tables in words: parameters, quantities, and the bound of the search's answer."""
+        filters = [space.filter for space in self.spaces if space.filter is not None]
+        parameters = {
+            one.name: Column(one.name, "parameter", one.meaning, one.unit)
+            for filter_ in filters
+            for one in filter_.family.parameters
+        }
+        unit = self.quantities[self.objective.column].unit
+        return {**parameters, **self.quantities, UPPER_BOUND: Column(UPPER_BOUND, "search", "", unit)}
 
     @property
     def n_filters(self) -> int:

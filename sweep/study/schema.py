@@ -364,6 +364,8 @@ class StudySection(Section):
     """How designs do on lights that they have not seen."""
     published: dict[Name, dict[Name, dict[Name, Number]]] = {}
     """Printed figures to compare with: table -> CFA, design or geometry -> quantity -> value."""
+    clouds: dict[Name, Annotated[list[Name], Field(min_length=2, max_length=2)]] = {}
+    """CFAs whose digital numbers of all lamps the report draws: CFA -> two of its channels."""
 
     @model_validator(mode="before")
     @classmethod

@@ -143,6 +143,9 @@ def narrowed(section: StudySection, member: SensorAndLights) -> tuple[StudySecti
         grid = grid.model_copy(update={"start_nm": start, "stop_nm": stop})
         notes.append(f"{member.sensor}: curves from {start:g} to {stop:g} nm")
     changes: dict[str, Any] = {"wavelengths": grid}
+    _, at, fit = (section.sensor.builtin or "").partition("@")
+    if fit and section.lights.builtin == "tl16":  # the lamps of the same fit: the figures hold for both together
+        changes["lights"] = section.lights.model_copy(update={"builtin": f"tl16{at}{fit}"})
     names = _curve_names(section)
     if names is not None:
         changes |= _buildable(section, names)
@@ -197,6 +200,7 @@ def _buildable(section: StudySection, names: set[str]) -> dict[str, Any]:
         key: {n: e for n, e in entries.items() if e.cfa in cfas or e.cfa not in section.cfas}
         for key, entries in filters.items()
     }
+    filters["clouds"] = {n: c for n, c in section.clouds.items() if n in cfas or n not in section.cfas}
     searched = {**filters["sweeps"], **filters["boxes"]}
     space_name = None if section.search is None else section.search.space
     if section.search is None or space_name is None or space_name in searched:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -103,12 +104,12 @@ class Sources:
     ) -> _Made | None:
         """Return a built-in sensor or lights on the study's wavelengths, also beyond theirs; None after issues."""
         if name not in known:
-            shown = dict.fromkeys(f"{one.partition('/')[0]}/NAME" if "/" in one else one for one in known)
+            shown = dict.fromkeys(re.sub(r"/.*", "/NAME", re.sub(r"@.*", "@NUMBER", one)) for one in known)
             allowed = f"{', '.join(shown)}, or a mapping with `files`"
             self.refuse(Fault(at, f"unknown built-in {at[-1]}", name, allowed, nearest(name, known)))
             return None
         try:
-            inside = anywhere or name not in MODELED or self.in_built_in_range("the built-in curves")
+            inside = anywhere or name.partition("@")[0] not in MODELED or self.in_built_in_range("the built-in curves")
             return known[name](self.grid) if inside else None
         except DataError as error:
             (first, *_) = error.issues

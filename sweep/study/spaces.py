@@ -18,7 +18,7 @@ from ..designs.registry import FAMILIES, PIGMENTS, build_family
 from ..designs.space import Filter, Kind, Space
 from ..designs.technology import PIGMENT
 from ..designs.ungridded import ListedDesigns, Method, PairedDesigns, SampledDesigns
-from ..spectra.builtin.surrogate import surrogate_parameters
+from ..spectra.builtin.surrogate import parameters_of
 from ..spectra.colorants import Colorants
 from .document import KeyPath
 from .schema import BoxSection, DesignSection, Modification, StudySection, SweepSection
@@ -125,7 +125,7 @@ class SpaceBuilder:
                 elif isinstance(value, str) and value not in numbers:
                     self.sources.refuse(unknown(("designs", name, "at", key), "colorant", value, numbers))
             return {key: numbers.get(value, 1) if isinstance(value, str) else value for key, value in design.at.items()}
-        known = surrogate_parameters().stopbands
+        known = parameters_of(self.section.sensor.builtin).stopbands
         if design.at not in known:
             self.sources.refuse(unknown(("designs", name, "at"), "built-in filter", design.at, known))
             return {}

@@ -31,7 +31,7 @@ _Curves = TypeVar("_Curves", SensorSection, LightsSection)
 _Made = TypeVar("_Made")
 RESERVED = (
     *("design_id", "filter_id", "kind", "name", "space", "cfa", "family", "scenario", "objective"),
-    *("limit", "gap", "feasible", "violation", "pareto", "plan", "promised_dn", "status"),
+    *("upper_bound", "gap", "feasible", "violation", "pareto", "simulation_key", "omitted_effects_bound_dn", "status"),
 )
 """Columns that are no quantities."""
 _SAME = 1e-9

@@ -32,13 +32,13 @@ def test_forms_of_a_curve_are_one(tiny: sweep.LoadedStudy, tmp_path: Path) -> No
 
 
 def test_upper_bound_holds_for_filters_that_meet_its_constraints(tiny: sweep.LoadedStudy) -> None:
-    limit = tiny.limit(sensitivity=0.92)
+    limit = tiny.upper_bound(sensitivity=0.92)
     assert limit.curve is not None
     attained = tiny.evaluate(N=limit.curve, scenario="chart")
     assert attained.feasible.isna().tolist() == [False]
     assert attained.sensitivity[0] >= 0.92 - 1e-9
     assert attained.csd_yellow_red[0] <= limit.proven + np.sqrt(4)  # of rounding, half a DN in each of four channels
-    assert limit.proven < tiny.limit().proven
+    assert limit.proven < tiny.upper_bound().proven
 
 
 @pytest.mark.parametrize(

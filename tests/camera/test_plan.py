@@ -20,7 +20,7 @@ from sweep.camera.setup import READOUT
 from ..cases import thinned
 from ..hard.random_scenes import columns as random_columns
 from ..hard.random_scenes import random_scene
-from ..hard.scenes import DARK, F2, FAR, HARD, DesignScene, columns, lights, scene
+from ..hard.scenes import DARK, F2, FAR, HARD, NEAR, DesignScene, columns, lights, scene
 from ..hard.scenes_alone import ALONE
 
 LATTICE = Accuracy(finest_phase_px=0.0, field_positions=9)
@@ -105,6 +105,38 @@ def test_an_effect_alone_changes_no_csd_by_more_than_its_bound_and_inactive_ones
         assert np.abs(found - exact).max() <= bound_dn * (1 + 1e-9) + _ARITHMETIC_DN, name
 
 
+SMALL: dict[str, tuple[str, dict[str, Any], dict[str, Any], float | None]] = {
+    "angle": ("RYNCy", {"optics": {"f_number": 200.0}}, {}, 1.8),
+    "illumination": ("RYNCy", {"off_axis_deg": 0.2}, {}, None),
+    "extinction": ("RYNCy", {"target": NEAR, "visibility_m": 1e7}, {}, None),
+    "veiling glare": ("RYNCy", {"veiling_glare": {"share": 2e-5, "field_cd_m2": 3000}, "target": NEAR}, {}, None),
+    "crosstalk": ("quad", {}, {"crosstalk": 1e-6}, None),
+}
+"""Scenes with little of an effect, under noise, which dithers the steps of rounding: the tile, the scene, the pixel, the index of its filters."""
+
+
+@pytest.mark.parametrize("name", list(SMALL))
+def test_little_of_an_effect_is_left_out(name: str) -> None:
+    cfa, given, pixel, index = SMALL[name]
+    made = scene(name, cfa, {"noise": True} | given, DARK | pixel, index=index)
+    plan = planned(made, 0.1)
+    assert name in plan.left_out - inactive_effects(made.box)
+    exact, found = (columns(made, READOUT | out, LATTICE) for out in (frozenset[str](), frozenset({name})))
+    bound_dn = next(choice.bound_dn for choice in plan.choices if choice.effect == name)
+    assert bound_dn is not None
+    assert 0 < np.abs(found - exact).max() <= bound_dn
+
+
+def test_crosstalk_between_pixels_of_one_kind_changes_no_uniform_field() -> None:
+    made = scene("clear", "RCCC", {}, {"crosstalk": 0.1})
+    alone = made.setup.camera.mosaic.from_rows("C", [["C"]])
+    qe = made.setup.camera.qe[[made.setup.camera.mosaic.channels.index("C")]]
+    bound_dn = EFFECTS["crosstalk"].bound_dn
+    assert bound_dn is not None
+    assert bound_dn(Box(made.setup.with_camera(mosaic=alone, qe=qe), qe, qe), frozenset()) == 0
+    assert bound_dn(made.box, frozenset()) > 0
+
+
 LIT = {"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 3e-3}}
 ALL_ON = scene(
     "all on",
@@ -114,6 +146,7 @@ ALL_ON = scene(
         "target": FAR | {"phase_px": [0.3, 0.6]},
         "visibility_m": 2000,
         "off_axis_deg": 10,
+        "veiling_glare": {"share": 0.02, "field_cd_m2": 100},
         "drive": {"duty": 0.5, "frequency_hz": 900},
         "optics": F2 | {"cra_deg": 12.0},
         "noise": True,
@@ -128,6 +161,7 @@ STAGES: dict[str, tuple[frozenset[str], Any, tuple[str, ...]]] = {
     "angle": (frozenset({"angle"}), angular, ("_matrix",)),
     "illumination": (frozenset({"illumination"}), irradiance, ("relative_illumination",)),
     "extinction": (frozenset({"extinction"}), irradiance, ("air_transmittance",)),
+    "veiling glare": (frozenset({"veiling glare"}), irradiance, ("with_veiling_glare",)),
     "flicker": (frozenset({"flicker"}), pwm, ("extremes",)),
     "noise": (READOUT, readout.table, ("mean_rounded", "mean_unrounded")),
     "quantization": (frozenset({"quantization", "noise"}), readout, ("rounded",)),

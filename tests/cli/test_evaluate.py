@@ -36,18 +36,18 @@ def test_the_limit_is_of_filters_with_as_much_light(own: Path) -> None:
         boxes={"any": {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": 0.0}},
         constraints={"sensitivity": {"min": 0.9}},
     )
-    limit = study.limit()
+    limit = study.upper_bound()
     assert limit.curve is not None
     best = pd.DataFrame({"N (QE)": limit.curve}, index=pd.Index(study.wavelength_nm, name="wavelength_nm"))
     best.to_csv(own.with_name("best.csv"))
     found = sweep.evaluate(own.with_name("best.csv"))
     assert found.gap is not None
     assert found.gap < 1e-4
-    assert found.limit == pytest.approx(limit.proven, abs=0.01)
+    assert found.upper_bound == pytest.approx(limit.proven, abs=0.01)
     mine = sweep.evaluate(own, relative_to="Y")
-    assert mine.limit is not None
+    assert mine.upper_bound is not None
     assert mine.before_quantization_dn is not None
-    assert mine.gap == pytest.approx(1 - mine.before_quantization_dn / mine.limit)
+    assert mine.gap == pytest.approx(1 - mine.before_quantization_dn / mine.upper_bound)
     assert 0.01 < mine.gap < 1
 
 
@@ -81,13 +81,13 @@ def test_a_filter_a_little_above_the_curve_it_replaces_has_a_limit_too(tmp_path:
     assert "no filter between 0 and the larger of Y and itself, which leaves the exposure to other pixels," in str(
         found
     )
-    assert found.before_quantization_dn <= found.limit
+    assert found.before_quantization_dn <= found.upper_bound
     stops = [np.where((nm > a) & (nm < a + w), 0.5, 1.0) for a in range(560, 680, 10) for w in (10, 30, 50)]
     rivals = np.maximum(y, sampled) * np.array(stops)
     rivals = rivals[(rivals.sum(axis=1) <= y.sum()) & (rivals.sum(axis=1) >= sampled.sum())]
     assert len(rivals) > 2
     # The table's are rounded: two of four steps.
-    assert study.evaluate(N=rivals)["csd_yellow_red"].max() <= found.limit + 2
+    assert study.evaluate(N=rivals)["csd_yellow_red"].max() <= found.upper_bound + 2
 
 
 @pytest.mark.parametrize(

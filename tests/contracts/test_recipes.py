@@ -284,8 +284,8 @@ def test_a_metric_is_one_new_file(tmp_path: Path) -> None:
     assert best["red_share"] == pytest.approx(0.8, abs=1e-6)
     assert best["csd_yellow_red"] >= swept["csd_yellow_red"].max() - 1
     search = json.loads((folder / "provenance.json").read_text())["search"]
-    assert search["limit_proven"] >= best["csd_yellow_red"] - 1
-    assert search["limit_left_out"] == []
+    assert search["upper_bound_proven"] >= best["csd_yellow_red"] - 1
+    assert search["upper_bound_left_out"] == []
     assert "share of red" in (folder / "report.html").read_text()
 
 

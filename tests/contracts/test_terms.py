@@ -71,7 +71,7 @@ def limit(most: float | None) -> Any:
         boxes={"any": {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": 0.0}},
         constraints=constraints,
     )
-    return study, study.limit()
+    return study, study.upper_bound()
 
 
 def test_a_bound_keeps_to_the_light_that_is_allowed_at_most() -> None:

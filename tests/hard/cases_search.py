@@ -19,9 +19,9 @@ from sweep.metrics.objective import Objective
 from sweep.runs.rows import rules_of
 from sweep.runs.search import run_search
 from sweep.search.gradients import BACK_OFF
-from sweep.search.limit import limit_of
 from sweep.search.problem import Problem, starting_points
 from sweep.search.solver import extreme_value
+from sweep.search.upper_bound import upper_bound_of
 from sweep.study import load_study
 
 from ..build import stopband_study
@@ -152,7 +152,7 @@ def limit_of_two_lines() -> Result:
     results = []
     for nodes in (0.25, 0.5, 0.875, 1.0, 5.0):
         least = 1 - nodes / STEPS
-        found = limit_of(depth_problem({"sensitivity": Bound(min=least)}))
+        found = upper_bound_of(depth_problem({"sensitivity": Bound(min=least)}))
         exact = csd_of(min(nodes, 1.0))
         results.append((max(0.0, exact - found.attained, found.proven - exact), 1e-3 + 1e-6))
         results.append((max(0.0, exact - found.proven), 1e-6))

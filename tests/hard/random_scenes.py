@@ -37,6 +37,7 @@ _ANY_PLACE_PX = 6.0
 """Larger lights at any place take too long."""
 _MOVED_EVERY = 3
 """In scenes of some seeds filters move with the angle of the light."""
+_GLARE_EVERY = 4
 _FIELD_EVERY, _EVERYWHERE_EVERY = 6, 30
 """Of these, in some there are three places of the sensor, in some all places count."""
 _ANY_PLACE_EVERY = 14
@@ -62,6 +63,9 @@ def random_scene(seed: int) -> RandomScene:
     """The scene of a seed, always the same."""
     rng = np.random.default_rng([seed, 17])
     given = _scenario(rng, may_be_anywhere=seed % _ANY_PLACE_EVERY == 0)
+    if seed % _GLARE_EVERY == 0 and "target" in given:
+        share, field = np.random.default_rng([seed, 21]).uniform(-5, -0.5), np.random.default_rng([seed, 22])
+        given["veiling_glare"] = {"share": float(10**share), "field_cd_m2": float(10 ** field.uniform(0, 4.5))}
     cra_deg = float(np.random.default_rng([seed, 19]).uniform(0, 35))
     if seed % _FIELD_EVERY == 0 and given.get("target", {}).get("phase_px") != "any":
         given["field"] = {"cra_max_deg": cra_deg, "places": 3 if seed % _EVERYWHERE_EVERY else "any"}

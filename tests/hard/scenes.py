@@ -110,6 +110,7 @@ NEAR, MIDDLE, FAR = target(20, 120), target(100, 60), target(250, 30)
 TINY = target(600, 60, phase_px="any")
 F2, F4 = {"f_number": 2.0}, {"f_number": 4.0}
 FIXED = {"kind": "fixed", "exposure_s": 2e-3}
+LIT = {"exposure": FIXED, "intensity_cd": 200}
 DARK = {"read_noise_e": 2.0, "offset_dn": 64.0}
 
 HARD: tuple[DesignScene, ...] = (
@@ -133,6 +134,16 @@ HARD: tuple[DesignScene, ...] = (
     scene("off axis", "RYNCy", {"off_axis_deg": 40}),
     scene("fog", "RYNCy", {"target": MIDDLE, "visibility_m": 100}),
     scene("haze", "RYNCy", {"target": FAR, "visibility_m": 4000}),
+    scene("glare", "RYNCy", {"veiling_glare": {"share": 0.03}, "background_cd_m2": 1000, "target": FAR} | LIT),
+    scene("glare, box", "RYNCy", {"veiling_glare": {"share": 0.01, "field_cd_m2": 3000}, "target": MIDDLE}, wide=True),
+    scene(
+        "glare, saturated",
+        "RGGB",
+        {"veiling_glare": {"share": 0.05, "field_cd_m2": 20000}, "target": MIDDLE, "intensity_cd": 200}
+        | {"exposure": {"kind": "fixed", "exposure_s": 4e-2}, "optics": F2},
+    ),
+    scene("at an angle, alone", "RYNCy", {"optics": {"f_number": 8.0, "cra_deg": 5.0}}, index=1.8),
+    scene("at an angle, alone, box", "RYNCy", {"optics": {"f_number": 90.0}}, index=1.8, wide=True),
     scene("background", "RYNCy", {"target": MIDDLE, "background_cd_m2": 3000, "exposure": FIXED, "intensity_cd": 200}),
     scene(
         "flicker",

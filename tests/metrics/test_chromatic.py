@@ -18,9 +18,9 @@ from sweep.metrics.chromatic import (
     squared_distance,
 )
 from sweep.metrics.smooth import SmoothDesign
-from sweep.search.limit import limit_of
 from sweep.search.problem import best_feasible, starting_points
 from sweep.search.solver import search_from
+from sweep.search.upper_bound import upper_bound_of
 from sweep.study.load import load_study
 
 from ..hard.scenes import FAMILY, scene
@@ -94,7 +94,7 @@ def test_no_filter_exceeds_the_upper_bound() -> None:
     study = load_study(STUDIES / "chromatic.yaml")
     assert study.search is not None
     problem = study.problem(study.search)
-    limit = limit_of(problem)
+    limit = upper_bound_of(problem)
     assert limit.curve is not None
     assert limit.attained == pytest.approx(limit.proven, abs=0.01)
     base = problem.setup.camera.base_qe[0]
@@ -118,7 +118,7 @@ def test_no_answer_exceeds_the_upper_bound_beside_a_worst_case() -> None:
         study = load_study(STUDIES / "chromatic.yaml", changes=changes)
         assert study.search is not None
         problem = study.problem(study.search)
-        proven.append(limit_of(problem).proven)
+        proven.append(upper_bound_of(problem).proven)
         runs = [search_from(problem, 0, u, "SLSQP", 300) for u in starting_points(problem, 3, 1)]
         best = best_feasible([evaluation for run in runs for evaluation in run.log])
         assert best is None or best.objective <= proven[-1] * (1 + 1e-9)

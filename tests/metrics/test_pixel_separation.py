@@ -13,8 +13,8 @@ from sweep.designs.space import Space
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_response
-from sweep.search.limit import limit_of
 from sweep.search.problem import Problem, starting_points
+from sweep.search.upper_bound import upper_bound_of
 from sweep.study import Study
 
 from ..build import load
@@ -84,14 +84,14 @@ def test_search_and_bound_are_those_of_a_tile_whose_pixels_have_names(tmp_path: 
     point = starting_points(by_pixel, 2, 1)[1]
     for mine, its in zip(rows_at(by_pixel, point), rows_at(apart, point), strict=True):
         np.testing.assert_allclose(np.sort(mine, axis=0), np.sort(its, axis=0), rtol=1e-9, atol=1e-6)
-    mine, its = limit_of(by_pixel), limit_of(apart)
+    mine, its = upper_bound_of(by_pixel), upper_bound_of(apart)
     assert mine.proven == pytest.approx(its.proven, abs=2e-3)
     assert mine.attained == pytest.approx(its.attained, abs=2e-3)
 
 
 def test_no_search_exceeds_the_bound_of_two_equal_pixels(tmp_path: Path) -> None:
     by_pixel = problem(tmp_path, NAMED_TWICE, "pixel_csd_yellow_red")
-    limit, best = limit_of(by_pixel), best_of(by_pixel, 4, 100)
+    limit, best = upper_bound_of(by_pixel), best_of(by_pixel, 4, 100)
     assert limit.curve is not None
     assert best is not None
     assert best.objective <= limit.proven
@@ -101,5 +101,6 @@ def test_no_search_exceeds_the_bound_of_two_equal_pixels(tmp_path: Path) -> None
     assert limit.attained == pytest.approx(np.sqrt((apart**2).sum(axis=-1).min()), rel=1e-9)
     once = Objective(minimum={"csd_yellow_red": 1.0})
     assert (
-        csd_of(by_pixel.setup, limit.curve[None, None])[0] <= limit_of(replace(by_pixel, objective=once)).proven + 1e-3
+        csd_of(by_pixel.setup, limit.curve[None, None])[0]
+        <= upper_bound_of(replace(by_pixel, objective=once)).proven + 1e-3
     )

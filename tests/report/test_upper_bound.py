@@ -65,7 +65,7 @@ def check_shown_bounds(output: Output) -> int:
             shown += 1
     (line,) = [text for text in next(iter(Method.of(output))).limits if text.startswith("Upper bound")]
     where = f"{search.channel} of {search.cfa}" + (f" in {search.scenario}" if len(output.scenarios) > 1 else "")
-    assert search.limit_proven is None or f"for any filter in {where}: " in line
+    assert search.upper_bound_proven is None or f"for any filter in {where}: " in line
     for trade_off in TradeOff.of(output):
         if trade_off.bounds is None:
             continue
@@ -89,7 +89,7 @@ def test_the_bound_of_one_scenario_is_not_shown_beside_the_design_of_another(tmp
     assert leaders_of(output).scenario == "day"  # the search's
     bright = leaders_of(output, "night").chosen
     assert bright is not None
-    assert bright[output.goal.name] > 2 * output.provenance.search.limit_proven  # type: ignore[union-attr, operator]
+    assert bright[output.goal.name] > 2 * output.provenance.search.upper_bound_proven  # type: ignore[union-attr, operator]
     (scenes,) = Scenes.of(output)
     best = {scene.partition(":")[0]: design for scene, design, *_ in scenes.rows}
     assert best["night"] == f"filter {bright['filter_id']} of RYNCy"
@@ -101,7 +101,7 @@ def test_a_value_above_its_own_bound_is_an_error(tmp_path: Path) -> None:
     output = output_of(tmp_path, text)
     row = output.best.iloc[0].to_dict()
     assert output.provenance.search is not None
-    proven = output.provenance.search.limit_proven
+    proven = output.provenance.search.upper_bound_proven
     assert proven is not None
     assert upper_bound_beside(output, row) is not None
     assert upper_bound_beside(output, row | {output.goal.name: proven + 0.5}) is None  # its rounding

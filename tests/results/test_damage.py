@@ -48,7 +48,15 @@ published: {Table 2: {RGGB: {csd_yellow_red: 138}}}
 FIRST, SECOND, PART = map(part_name, range(3))
 DRAWN = ("report.html", "pareto.png", "pareto.svg", "paper_comparison.parquet")
 FILES = (
-    *(PART, "designs.parquet", "pareto.parquet", "search.parquet", "front.parquet", "curves.parquet", "points.parquet"),
+    *(
+        PART,
+        "designs.parquet",
+        "pareto.parquet",
+        "search.parquet",
+        "search_front.parquet",
+        "curves.parquet",
+        "points.parquet",
+    ),
     *("audit.parquet", "study.resolved.yaml", "provenance.json", *DRAWN),
 )
 

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sweep.results.records import from_json, to_json
-from sweep.search.limit import Limit
 from sweep.search.problem import Evaluation, SearchRun
+from sweep.search.upper_bound import UpperBound
 
 from ..tampering import hostile
 
@@ -58,17 +58,17 @@ def value_of(kind: object) -> object:
 
 
 def test_a_limit_comes_back_whatever_its_fields() -> None:
-    hints = get_type_hints(Limit)
-    limit = Limit(**{field.name: value_of(hints[field.name]) for field in fields(Limit)})  # type: ignore[arg-type]
-    again = from_json(Limit, to_json(limit))
-    for field in fields(Limit):
+    hints = get_type_hints(UpperBound)
+    limit = UpperBound(**{field.name: value_of(hints[field.name]) for field in fields(UpperBound)})  # type: ignore[arg-type]
+    again = from_json(UpperBound, to_json(limit))
+    for field in fields(UpperBound):
         made, read = getattr(limit, field.name), getattr(again, field.name)
         assert type(made) is type(read)
         if isinstance(made, np.ndarray):
             assert made.tobytes() == read.tobytes()
         else:
             assert made == read
-    assert from_json(Limit, to_json(Limit(-np.inf, np.inf, None))).proven == np.inf
+    assert from_json(UpperBound, to_json(UpperBound(-np.inf, np.inf, None))).proven == np.inf
 
 
 @pytest.mark.parametrize("value", [object(), np.array([object()]), {3}, b"bytes", lambda: None])

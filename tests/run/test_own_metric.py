@@ -51,8 +51,8 @@ def test_a_csd_written_again_has_the_same_numbers_and_the_same_optimum(tmp_path:
     assert found.search is not None
     assert exact.search is not None
     assert found.search.best_smooth_objective == pytest.approx(exact.search.best_smooth_objective, abs=0.01)
-    assert found.search.limit_proven is None
-    assert found.search.no_limit == "apart is an own metric, of which nothing is known"
+    assert found.search.upper_bound_proven is None
+    assert found.search.no_upper_bound == "apart is an own metric, of which nothing is known"
     assert len(found.data_sha256["mine.py"]) == 64
     assert any("nothing is promised or proven of this metric" in warning for warning in found.warnings)
     kept = {

@@ -49,7 +49,9 @@ def test_rows_stand_in_order_with_their_columns(output: Path) -> None:
     assert len(frame) == 2 * (2 + 1 + 26 * 2 * 51 * 2) + 1
     assert list(frame["design_id"]) == list(range(len(frame)))
     every = {"chromatic_csd_orange_red", "slope_per_nm", "min_transmission", "edge_width_nm", "pareto"}
-    assert {"filter_id", "left_nm", "csd_green_red", "sensitivity", "violation", "promised_dn"} <= {*frame.columns}
+    assert {"filter_id", "left_nm", "csd_green_red", "sensitivity", "violation", "omitted_effects_bound_dn"} <= {
+        *frame.columns
+    }
     assert not every & {*frame.columns}
     for name in ("pareto.parquet", "designs.parquet"):
         assert {*frame.columns, *every} <= {*pd.read_parquet(output / name)}

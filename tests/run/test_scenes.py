@@ -31,13 +31,13 @@ def test_scenes_are_planned_and_drawn(road: tuple[Study, Path]) -> None:
     frame = pd.read_parquet(folder / "results.parquet")
     assert set(frame["status"]) == {"ok"}
     assert (frame["csd_yellow_red"] < frame["best_phase_csd_yellow_red"]).all()
-    assert (frame["promised_dn"] <= 2.5).all()
-    assert (frame["promised_dn"] > 0).all()
+    assert (frame["omitted_effects_bound_dn"] <= 2.5).all()
+    assert (frame["omitted_effects_bound_dn"] > 0).all()
     output = read_output(folder)
     make_report(output)
     assert "<svg" in (folder / "report.html").read_text()
     plans = output.provenance.plans
-    assert frame["plan"].iloc[0] == plans["road distance_m=150"].key
+    assert frame["simulation_key"].iloc[0] == plans["road distance_m=150"].key
     check = output.provenance.check
     assert check is not None
     assert check.passed

@@ -14,8 +14,8 @@ from scipy.special import ndtr
 from sweep.base.errors import StudyError
 from sweep.camera.curve_errors import CurveErrors, drawn_curves
 from sweep.camera.sensor import BUILT_IN_SENSORS
-from sweep.search.limit import limit_of
 from sweep.search.solver import smooth_evaluation
+from sweep.search.upper_bound import upper_bound_of
 from sweep.spectra.builtin.data_sets.tl16 import lights
 from sweep.spectra.builtin.measured_sets import SENSORS, WIDE
 from sweep.spectra.spectrum import WavelengthGrid
@@ -78,7 +78,7 @@ def test_opencam_is_what_an_own_computation_says() -> None:
     (rggb,), _ = own_csd(np.stack([curves[c] for c in "RGB"])[None], np.array([1.0, 2, 1]))
     (ryycy,), _ = own_csd(np.stack([curves[c] for c in ("R", "Y", "Cy")])[None], np.array([1.0, 2, 1]))
     assert ryycy / rggb == pytest.approx(0.42, abs=0.005)
-    assert limit_of(study.problem(study.search)).proven == pytest.approx(318.8, abs=0.05)
+    assert upper_bound_of(study.problem(study.search)).proven == pytest.approx(318.8, abs=0.05)
 
 
 ERRORS = CurveErrors(gain=0.05, shift_nm=2.0, noise=0.03, correlation_nm=30.0, ir_cut_nm=3.0, draws=2000)
@@ -170,7 +170,7 @@ cfas:
   RYNCy:
   RGBN: {tile: [[R, G], [B, N]]}
 designs:
-  RYN4Cy: {cfa: RYNCy, channel: N, base: Y, to: G, at: RYN4Cy}
+  paper_N4: {cfa: RYNCy, channel: N, base: Y, to: G, at: paper_N4}
 boxes:
   yellow:
     cfa: RYNCy
@@ -207,7 +207,7 @@ def test_one_table_has_all_sensors_and_lights(several: tuple[Path, str]) -> None
         np.testing.assert_array_equal(part["csd_yellow_red"], alone["csd_yellow_red"])
         found = part[part["kind"] == "search"].iloc[0]
         assert found["cfa"] == ("RGBN" if sensor == "ar0132at" else "RYNCy")
-    assert "Note: ar0132at: without RYNCy, RYN4Cy, yellow, whose curves ar0132at does not have." in out
+    assert "Note: ar0132at: without RYNCy, paper_N4, yellow, whose curves ar0132at does not have." in out
     found = rows[rows["kind"] == "search"].set_index(["sensor", "lights"])["csd_yellow_red"]
     rggb = rows[rows["name"] == "RGGB"].set_index(["sensor", "lights"])["csd_yellow_red"]
     ratio = (found / rggb).loc[["ar0820", "opencam"]]

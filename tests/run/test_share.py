@@ -21,8 +21,8 @@ from sweep.results.tables import RESULTS
 from sweep.runs.robustness import Candidate, drawn_dn
 from sweep.runs.rows import parts_of
 from sweep.search.gradients import Model
-from sweep.search.limit import limit_of, reason_without_bound
 from sweep.search.problem import Problem, SearchRun, starting_points
+from sweep.search.upper_bound import reason_without_bound, upper_bound_of
 from sweep.study import Search, Study, load_study
 
 from ..build import load, one_line, ran
@@ -152,7 +152,7 @@ def test_the_limit_leaves_a_constraint_on_it_out_and_says_so() -> None:
     """Few lamps are the nearest: what 99 % have says nothing of the smallest CSD, by which filters must not be bound."""
     plain = replace(problem("csd_yellow_red"), constraints={"sensitivity": Bound(min=0.9)})
     requested = replace(plain, constraints=plain.constraints | {"yield_csd_yellow_red": Bound(min=400)})
-    without, found = limit_of(plain), limit_of(requested)
+    without, found = upper_bound_of(plain), upper_bound_of(requested)
     assert found.left_out == ("yield_csd_yellow_red",)
     assert found.proven == without.proven > 0
 

@@ -15,8 +15,8 @@ from sweep.metrics.bound import FEASIBLE, Bound, total_violation
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.separation import separation
 from sweep.metrics.smooth import smooth_response
-from sweep.search.limit import Limit, limit_of
 from sweep.search.problem import Problem
+from sweep.search.upper_bound import UpperBound, upper_bound_of
 
 TEXT = """\
 study: sides
@@ -68,7 +68,7 @@ def smallest(problem: Problem, curve: np.ndarray, name: str) -> float:
     return min(float(separation(place[None], first, second)[0]) for place in response)
 
 
-def check_attained(problem: Problem, limit: Limit) -> None:
+def check_attained(problem: Problem, limit: UpperBound) -> None:
     """The filter of the limit meets everything, and reaches what is said."""
     curves = limit.curve[None, None]
     amounts = designed_quantities(problem.setup, curves)
@@ -148,9 +148,9 @@ def milp_limit(problem: Problem, t: float) -> float:
     return t + float(found.x[-1]) if found.status == 0 else -np.inf
 
 
-def limit_checked_by_milp(problem: Problem) -> Limit:
+def limit_checked_by_milp(problem: Problem) -> UpperBound:
     """The upper bound of a problem, once it was compared with the MILP."""
-    limit = limit_of(problem)
+    limit = upper_bound_of(problem)
     check_attained(problem, limit)
     assert limit.open_parts == 0
     assert 0 <= limit.proven - limit.attained <= 1e-3

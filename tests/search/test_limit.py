@@ -20,16 +20,16 @@ from sweep.report.sections.method import limit_line
 from sweep.results.facts import SearchFacts
 from sweep.results.output import Output
 from sweep.search.gradients import Model
-from sweep.search.limit import _relaxed, limit_of, reason_without_bound
 from sweep.search.problem import Problem, SearchRun, starting_points
 from sweep.search.trade_off import check_proof
+from sweep.search.upper_bound import _relaxed, reason_without_bound, upper_bound_of
 from sweep.spectra.population import Population
 
 from ..cases import thinned
 from .limit_oracles import check_attained
 from .problems import PROBLEM, STUDY, best_of, csd_of, noisy_problem, problem_of
 
-LIMIT = limit_of(PROBLEM)
+LIMIT = upper_bound_of(PROBLEM)
 SETUP = PROBLEM.setup
 BASE = SETUP.camera.base_qe[0]
 
@@ -40,18 +40,18 @@ def constrained(**bounds: Bound) -> Problem:
 
 
 def test_a_tighter_study_has_a_lower_limit() -> None:
-    tight = limit_of(constrained(min_transmission=Bound(min=0.3)))
+    tight = upper_bound_of(constrained(min_transmission=Bound(min=0.3)))
     assert tight.proven < LIMIT.attained
     assert (tight.curve >= 0.3 * BASE * (1 - 1e-9)).all()
-    assert limit_of(constrained(slope_per_nm=Bound(max=0.04))).proven <= LIMIT.proven
-    assert limit_of(replace(PROBLEM, constraints={"sensitivity": Bound(min=1.01)})).curve is None
+    assert upper_bound_of(constrained(slope_per_nm=Bound(max=0.04))).proven <= LIMIT.proven
+    assert upper_bound_of(replace(PROBLEM, constraints={"sensitivity": Bound(min=1.01)})).curve is None
 
 
-def test_no_limit_is_claimed_where_the_program_is_not_linear() -> None:
+def test_no_upper_bound_is_claimed_where_the_program_is_not_linear() -> None:
     other = replace(PROBLEM, objective=Objective(sum={"csd_green_red": 1.0, "csd_yellow_red": 2.0}))
     assert reason_without_bound(other) == "the objective is a sum"
-    with pytest.raises(SweepError, match="no limit: the objective is a sum"):
-        limit_of(other)
+    with pytest.raises(SweepError, match="no upper bound: the objective is a sum"):
+        upper_bound_of(other)
     assert reason_without_bound(problem_of("dual")) == "more than one modified channel"
 
 
@@ -63,28 +63,24 @@ def test_least_loss_of_sensitivity_is_the_inverse_of_the_largest_separation() ->
         objective=Objective(minimum={"sensitivity": 1.0}),
         constraints={**slope, "csd_yellow_red": Bound(min=200.0)},
     )
-    found = limit_of(most)
+    found = upper_bound_of(most)
     assert 0 <= found.proven - found.attained <= 2e-6
     assert csd_of(SETUP, found.curve[None, None])[0] >= 200 * (1 - FEASIBLE)
-    back = limit_of(replace(PROBLEM, constraints={**slope, "sensitivity": Bound(min=found.attained)}))
+    back = upper_bound_of(replace(PROBLEM, constraints={**slope, "sensitivity": Bound(min=found.attained)}))
     assert back.attained == pytest.approx(200, abs=0.05)
     assert 0.9 < best_of(most, 4, 125).objective <= found.proven
 
 
 def test_upper_bound_leaves_out_constraints_of_edges() -> None:
-    found = limit_of(
+    found = upper_bound_of(
         replace(constrained(edge_width_nm=Bound(min=20.0), worst_sensitivity=Bound(min=0.93)), tolerance=Tolerance(2.0))
     )
     assert found.left_out == ("edge_width_nm", "edge shifts of sensitivity")
-    assert found.proven == pytest.approx(limit_of(constrained(sensitivity=Bound(min=0.93))).proven, abs=1e-9)
+    assert found.proven == pytest.approx(upper_bound_of(constrained(sensitivity=Bound(min=0.93))).proven, abs=1e-9)
 
 
-def test_no_limit_is_claimed_where_it_would_not_hold() -> None:
-    wave, cyan, green = STUDY.grid.nodes_nm, STUDY.sensor.qe["Cy"], STUDY.sensor.qe["G"]
-    qe = SETUP.camera.qe.copy()
-    qe[SETUP.camera.modified[0]] = cyan
-    above = replace(PROBLEM, family=Stopband(wave, cyan, green), setup=SETUP.with_camera(qe=qe))
-    assert reason_without_bound(above) == "filters of the box may exceed the curve that they replace"
+def test_no_upper_bound_is_claimed_where_it_would_not_hold() -> None:
+    wave, green = STUDY.grid.nodes_nm, STUDY.sensor.qe["G"]
     below = replace(PROBLEM, family=Stopband(wave, BASE, -0.1 * green))
     assert reason_without_bound(below) == "filters of the box may be below 0"
     bright = replace(SETUP, scene=Scene(exposure=FixedExposure(exposure_s=1000.0)))
@@ -119,14 +115,14 @@ def test_report_words_match_the_proof() -> None:
         objective="csd_yellow_red",
         best_smooth_objective=90.0,
         best_sensitivity=0.9,
-        limit_attained=90.0,
-        limit_proven=100.0,
-        limit_left_out=("edge_width_nm",),
-        limit_programs=9,
-        limit_open_parts=0,
-        front_limits_open=0,
+        upper_bound_attained=90.0,
+        upper_bound_proven=100.0,
+        upper_bound_left_out=("edge_width_nm",),
+        upper_bound_programs=9,
+        upper_bound_open_parts=0,
+        front_upper_bounds_open=0,
         gap=0.1,
-        no_limit=None,
+        no_upper_bound=None,
         front_evaluations=0,
     )
     words = limit_line(output, done)
@@ -134,9 +130,9 @@ def test_report_words_match_the_proof() -> None:
     assert f"{bracket}; the search's answer is 10.0 % below it" in words
     assert "under the same constraints but edge_width_nm, before clipping and quantization" in words
     assert "open" not in words
-    cut = limit_line(output, done.model_copy(update={"limit_open_parts": 3}))
+    cut = limit_line(output, done.model_copy(update={"upper_bound_open_parts": 3}))
     assert "it may not be the least one: 3 parts are open after 9 linear programs" in cut
-    none = done.model_copy(update={"no_limit": "the objective is a sum", "limit_proven": None})
+    none = done.model_copy(update={"no_upper_bound": "the objective is a sum", "upper_bound_proven": None})
     assert limit_line(output, none) == "Upper bound: none computed (the objective is a sum)."
 
 
@@ -144,7 +140,7 @@ def test_report_words_match_the_proof() -> None:
 def test_few_linear_programs_close_the_bracket_and_its_filter_attains_it(level: float) -> None:
     """Halving the range of 700 DN down to 1e-3 DN alone takes twenty, for each choice of 256 sides."""
     problem = constrained(sensitivity=Bound(min=level))
-    found = limit_of(problem)
+    found = upper_bound_of(problem)
     check_attained(problem, found)
     assert found.programs <= 20
     assert found.open_parts == 0
@@ -206,12 +202,29 @@ def test_yield_constraint_is_left_out_of_the_upper_bound() -> None:
         constraints=requested,
     )
     found = best_of(problem, 1, 60)
-    limit = limit_of(problem)
+    limit = upper_bound_of(problem)
     check_proof(found, limit)
     assert limit.left_out == ("yield_csd_yellow_red",)
 
 
-def test_no_limit_is_claimed_where_a_filter_comes_out_above_the_curve_that_it_replaces() -> None:
+def test_the_bound_is_of_what_the_box_reaches_where_that_is_above_the_replaced_curve() -> None:
+    wave, green = STUDY.grid.nodes_nm, STUDY.sensor.qe["G"]
+    above = np.where((wave >= 500) & (wave <= 560), 1.05 * BASE, np.minimum(green, BASE))
+    low, high = np.array([490.0, 6, 565, 6, 0]), np.array([500.0, 6, 575, 6, 1])
+    goal = Objective(minimum={"sensitivity": 1.0})
+    raised = replace(PROBLEM, family=Stopband(wave, BASE, above), low=low, high=high, objective=goal, constraints={})
+    plain, found = (
+        upper_bound_of(replace(raised, family=Stopband(wave, BASE, np.minimum(above, BASE)))),
+        best_of(raised, 2, 60),
+    )
+    limit = upper_bound_of(raised)
+    assert limit.of_box
+    assert not plain.of_box
+    assert plain.proven < found.objective <= limit.proven  # the old ceiling is not a bound on this box
+    check_proof(found, limit)
+
+
+def test_no_upper_bound_is_claimed_where_a_filter_comes_out_above_the_curve_that_it_replaces() -> None:
     """Its edges keep it from where its other curve is above that, but not when they come out elsewhere."""
     wave = STUDY.grid.nodes_nm
     target = np.where((wave >= 656) & (wave <= 658), 1.1 * BASE, np.minimum(STUDY.sensor.qe["G"], BASE))
@@ -220,6 +233,9 @@ def test_no_limit_is_claimed_where_a_filter_comes_out_above_the_curve_that_it_re
     problem = replace(
         half_yield_problem(), family=Stopband(wave, BASE, target), low=low, high=high, objective=objective
     )
-    assert reason_without_bound(problem) == "filters of the box may exceed the curve that they replace"
+    assert (
+        reason_without_bound(problem)
+        == "filters of the box may exceed the curve that they replace, and the bound is of more than plain CSDs"
+    )
     assert reason_without_bound(replace(problem, tolerance=NONE)) is None
     assert reason_without_bound(replace(problem, objective=Objective(minimum={"csd_yellow_red": 1.0}))) is None

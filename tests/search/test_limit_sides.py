@@ -10,9 +10,9 @@ import pytest
 
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
-from sweep.search.limit import limit_of
 from sweep.search.problem import Problem
 from sweep.search.sides import _NEAR
+from sweep.search.upper_bound import upper_bound_of
 from sweep.study import load_study
 
 from .limit_oracles import is_mixed, limit_checked_by_milp, milp_limit, random_problem, smallest, write_study
@@ -48,7 +48,7 @@ def test_a_proof_bounds_filters_of_other_sensitivities(coarse: Problem, seed: in
     problem = random_problem(coarse, seed)
     own = problem.constraints["sensitivity"].min
     levels = [own + off for off in (-0.08, -0.02, 0.0, 0.01, 0.04)]
-    limit = limit_of(problem, sensitivities=levels)
+    limit = upper_bound_of(problem, sensitivities=levels)
     assert limit.elsewhere[2] == pytest.approx(limit.proven, abs=_NEAR + 1e-3)
     assert (np.diff(limit.elsewhere) <= _NEAR).all()  # each may be that much above the bound of its weights
     for level, most in zip(levels, limit.elsewhere, strict=True):
@@ -72,7 +72,7 @@ def test_several_csds_have_sides_of_their_own(coarse: Problem, seed: int) -> Non
     bound = {**problem.constraints, "csd_yellow_orange": Bound(min=held + 1.0)}
     held_apart = replace(problem, constraints=bound)
     if milp_limit(held_apart, 0.0) == -np.inf:
-        assert limit_of(held_apart).proven == -np.inf
+        assert upper_bound_of(held_apart).proven == -np.inf
     else:
         assert limit_checked_by_milp(held_apart).proven <= free.proven
 
@@ -82,7 +82,7 @@ def test_an_interrupted_proof_returns_its_bound(coarse: Problem) -> None:
     whole = limit_checked_by_milp(problem)
     ends = []
     for most in (3, 6, 10, whole.programs):
-        found = limit_of(problem, most_programs=most)
+        found = upper_bound_of(problem, most_programs=most)
         assert found.programs <= most
         assert found.attained <= whole.proven
         assert found.proven >= whole.attained

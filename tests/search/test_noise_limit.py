@@ -16,8 +16,8 @@ from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth_noise import smooth_detectability
 from sweep.search.least_noise import least_variance
-from sweep.search.limit import limit_of, reason_without_bound
 from sweep.search.problem import Problem
+from sweep.search.upper_bound import reason_without_bound, upper_bound_of
 
 from .limit_oracles import halved
 from .problems import YELLOW_RED, best_of, noisy_problem
@@ -67,8 +67,8 @@ def test_each_error_without_upper_bound_has_a_reason() -> None:
         requested = replace(problem, objective=Objective.model_validate({rule: {quantity.name: 1.0}}))
         why = "is not convex in the filter: its noise grows with the light; d' has a limit"
         assert reason_without_bound(requested) == f"{quantity.name} {why}"
-        with pytest.raises(SweepError, match="no limit: "):
-            limit_of(requested)
+        with pytest.raises(SweepError, match="no upper bound: "):
+            upper_bound_of(requested)
     assert reason_without_bound(problem) is None
 
 
@@ -80,7 +80,7 @@ def test_no_filter_has_less_noise_or_a_larger_d_prime(scene: str) -> None:
     row, channel = halved(np.ones_like(base)) / halved(base).sum(), problem.setup.camera.modified[0]
     least = least_variance(imager, base, (np.zeros_like(base), base), row, 0.9)
     assert (imager.variance(curves)[..., channel] >= least).all()
-    limit = limit_of(problem)
+    limit = upper_bound_of(problem)
     reached = smooth_detectability(problem.setup, curves, YELLOW_RED)
     assert reached.max() <= limit.proven
     best = best_of(problem, 2, 120)
@@ -108,7 +108,7 @@ def test_the_least_light_is_that_of_a_linear_program() -> None:
 
 
 def test_bound_between_levels_is_given_only_for_valid_noise() -> None:
-    limit = limit_of(problem_in("chart"), sensitivities=(0.85, 0.9, 0.95))
+    limit = upper_bound_of(problem_in("chart"), sensitivities=(0.85, 0.9, 0.95))
     below, here, above = limit.elsewhere
     assert below == np.inf
     assert above <= here <= limit.proven + 1e-3

@@ -14,8 +14,8 @@ from sweep.metrics.members import population_model
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
 from sweep.search.gradients import Model
-from sweep.search.limit import Limit, limit_of, reason_without_bound
 from sweep.search.problem import Problem, SearchRun, starting_points
+from sweep.search.upper_bound import UpperBound, reason_without_bound, upper_bound_of
 from sweep.spectra.population import Population
 from sweep.study import load_study
 
@@ -58,9 +58,9 @@ def test_a_point_that_is_no_number_has_as_many_rows_and_is_never_feasible() -> N
 
 
 @cache
-def limit() -> Limit:
+def limit() -> UpperBound:
     assert reason_without_bound(problem(binning_nm=1)) is None
-    return limit_of(problem(binning_nm=1))
+    return upper_bound_of(problem(binning_nm=1))
 
 
 @pytest.mark.slow

@@ -14,9 +14,9 @@ from sweep.metrics.bound import Bound
 from sweep.metrics.members import population_model
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
-from sweep.search.limit import Limit, limit_of, reason_without_bound
 from sweep.search.perturbed import all_ways, perturbed_filters
 from sweep.search.problem import starting_points
+from sweep.search.upper_bound import UpperBound, reason_without_bound, upper_bound_of
 from sweep.study import load_study
 
 from ..conftest import STUDIES
@@ -34,8 +34,8 @@ FREE_FORM = (
 
 
 @cache
-def limit() -> Limit:
-    return limit_of(MOVED)
+def limit() -> UpperBound:
+    return upper_bound_of(MOVED)
 
 
 def test_a_bound_on_the_designed_sensitivity_does_not_hold_for_perturbed_filters() -> None:
@@ -71,13 +71,13 @@ def test_nonlinear_constraints_are_left_out_and_reported() -> None:
     """Moves by part of a step, films that are too thick, a field of all places."""
     assert not all_ways(replace(MOVED, tolerance=Tolerance(1.5)))
     assert len(perturbed_filters(replace(MOVED, tolerance=Tolerance(1.5)))) == 1
-    found = limit_of(replace(MOVED, tolerance=Tolerance(1.0)))
+    found = upper_bound_of(replace(MOVED, tolerance=Tolerance(1.0)))
     assert found.left_out == ("some edge shifts",)  # half a nanometer is no whole step
     assert found.proven > limit().proven
     assert limit().left_out == ()
-    thick = limit_of(replace(MOVED, tolerance=Tolerance(2.0, 0.003)))
+    thick = upper_bound_of(replace(MOVED, tolerance=Tolerance(2.0, 0.003)))
     assert thick.left_out == ("edge shifts",)
-    assert thick.proven == pytest.approx(limit_of(replace(MOVED, tolerance=NONE)).proven, abs=1e-3)
+    assert thick.proven == pytest.approx(upper_bound_of(replace(MOVED, tolerance=NONE)).proven, abs=1e-3)
 
 
 def moved(curve: np.ndarray, shift: int) -> np.ndarray:
@@ -111,7 +111,7 @@ def test_its_filter_keeps_the_bounds_of_the_study_on_worst_cases() -> None:
     """A program that knows some members of a worst case has filters that lack a little of it."""
     bounds = {**MOVED.constraints, "worst_csd_yellow_red": Bound(min=256)}
     requested = replace(MOVED, constraints=bounds, objective=Objective(minimum={"csd_yellow_red": 1.0}))
-    found = limit_of(requested)
+    found = upper_bound_of(requested)
     came_out = np.stack([way.curve(found.curve) for way in perturbed_filters(requested)])[:, None]
     each = smooth_csd(requested.setup, came_out, YELLOW_RED)
     assert each.min() >= 256 * (1 - 1e-9)
@@ -147,7 +147,7 @@ def test_free_form_filters_come_near_the_limit_over_lamps_and_edges() -> None:
     came_out = [searched.family.perturbed(ProductionError(shift)).curves(best.x[None]) for shift in SHIFTS]
     worst = population_model(searched.setup).worst(np.concatenate(came_out))["csd_yellow_red"].min()
     assert worst == pytest.approx(best.objective, rel=1e-9)
-    proven = limit_of(searched).proven
+    proven = upper_bound_of(searched).proven
     below = f"{1 - worst / proven:.1%}".replace("%", " %")
     assert f"Free-form filters reach {worst:.0f} DN in the worst case, {below} below the limit" in text
     assert 0.9 * proven <= worst <= proven

@@ -13,8 +13,8 @@ from sweep.camera.field import setup_at
 from sweep.camera.sensor_field import SensorField
 from sweep.camera.setup import Setup
 from sweep.metrics.smooth import smooth_csd, smooth_response
-from sweep.search.limit import Limit, limit_of, reason_without_bound
 from sweep.search.problem import Problem
+from sweep.search.upper_bound import UpperBound, reason_without_bound, upper_bound_of
 from sweep.study import load_study
 
 from ..conftest import STUDIES
@@ -50,9 +50,9 @@ def smallest_csd_at(setup: Setup, angles_deg: Iterable[float], curve: np.ndarray
 
 
 @cache
-def limit() -> Limit:
+def limit() -> UpperBound:
     assert reason_without_bound(problem()) is None
-    return limit_of(problem())
+    return upper_bound_of(problem())
 
 
 def test_its_filter_has_it_at_the_worst_place_and_more_at_the_others() -> None:
@@ -67,7 +67,7 @@ def test_over_all_places_it_is_a_bracket_of_the_worst_one() -> None:
     given = problem()
     field = SensorField(cra_max_deg=20.0, places="any")
     scene = given.setup.scene.model_copy(update={"field": field})
-    found = limit_of(replace(given, setup=replace(given.setup, scene=scene)))
+    found = upper_bound_of(replace(given, setup=replace(given.setup, scene=scene)))
     assert 0 <= found.proven - found.attained <= 0.02
     assert found.proven <= limit().proven + 1e-6
     least = smallest_csd_at(given.setup, np.linspace(0, 20, 200), found.curve)
@@ -111,7 +111,7 @@ def test_free_form_filters_come_near_the_limit_over_the_whole_sensor() -> None:
     searched = study.problem(study.search)
     curves = searched.family.curves(best_of(searched, 1, 200).x[None])
     worst_dn = worst_of_all_places_dn(searched.setup, curves[0])
-    proven = limit_of(searched).proven
+    proven = upper_bound_of(searched).proven
     assert worst_dn <= proven
     text = " ".join((STUDIES / "guide" / "06-lamps-angles-tolerances.md").read_text(encoding="utf-8").split())
     below = 1 - worst_dn / proven
@@ -136,6 +136,6 @@ def test_the_table_of_the_documentation() -> None:
             found[space.name] = [f"{smooth_csd(setup, curves, YELLOW_RED)[0]:.0f}" for setup in setups[:2]]
             found[space.name].append(f"{worst_of_all_places_dn(setups[2], curves[0]):.0f}")
     still = STUDY.problem(STUDY.search)
-    limits = limit_of(replace(still, setup=still.setup.with_camera(technologies=()))), limit_of(still)
+    limits = upper_bound_of(replace(still, setup=still.setup.with_camera(technologies=()))), upper_bound_of(still)
     found["upper bound"] = [f"{limits[0].proven:.0f}", "", f"{limits[1].proven:.0f}"]
     assert printed == found

@@ -20,9 +20,9 @@ from sweep.runs import search as searching
 from sweep.runs.dry_run import remaining_work, remaining_work_lines
 from sweep.search import trade_off
 from sweep.search.gradients import Model
-from sweep.search.limit import Limit, limit_of
 from sweep.search.problem import CONVERGED, Evaluation, Problem, SearchRun, best_feasible, starting_points
 from sweep.search.solver import ALGORITHMS, ONE_START, search_from
+from sweep.search.upper_bound import UpperBound, upper_bound_of
 
 from ..build import load, ran, sentences_of, stopband_study
 from ..commanded import commanded
@@ -131,7 +131,7 @@ def test_a_constraint_at_the_end_of_a_quantity_is_met(name: str, bound: Bound) -
     curves = family.curves(best.x[None])
     assert bound.violation(designed_quantities(problem.setup, curves)[name])[0] <= FEASIBLE
     assert np.ptp(curves) <= 1e-6  # 300 steps of what counts as no slope
-    assert best.objective <= limit_of(problem).proven
+    assert best.objective <= upper_bound_of(problem).proven
 
 
 def test_bounds_on_dimensions_are_met() -> None:
@@ -169,8 +169,8 @@ def test_an_upper_bound_below_the_search_result_stops_the_run(tmp_path: Path, mo
         searched.append(start)
         return search_from(problem, start, *rest)
 
-    def planted(problem: Problem, tolerance: float = 1e-3, *rest: int) -> Limit:
-        found = limit_of(problem, tolerance, *rest)
+    def planted(problem: Problem, tolerance: float = 1e-3, *rest: int) -> UpperBound:
+        found = upper_bound_of(problem, tolerance, *rest)
         return replace(found, proven=0.5 * found.proven) if tolerance == 0.02 else found
 
     def ended() -> tuple[int, str, str]:
@@ -180,7 +180,7 @@ def test_an_upper_bound_below_the_search_result_stops_the_run(tmp_path: Path, mo
         monkeypatch.setattr(module, "search_from", counted)
     with monkeypatch.context() as wrong:
         for module in (searching, trade_off):
-            wrong.setattr(module, "limit_of", planted)
+            wrong.setattr(module, "upper_bound_of", planted)
         code, _, err = ended()
         assert code == UpperBoundExceededError.exit_code == 5
         (said,) = err.splitlines()
@@ -223,7 +223,7 @@ def test_a_global_search_takes_one_start_and_ends_at_the_optimum_of_gradients(tm
     planned = "\n".join(remaining_work_lines(remaining_work(study, tmp_path / "none"), tmp_path))
     (most,) = re.findall(r"1 start, then SLSQP, (\d+) evaluations at most", planned)
     assert facts.evaluations <= int(most)
-    front = pd.read_parquet(tmp_path / "out" / "front.parquet").set_index("sensitivity_min")
+    front = pd.read_parquet(tmp_path / "out" / "search_front.parquet").set_index("sensitivity_min")
     assert front.loc[0.9, "objective"] == pytest.approx(facts.best_smooth_objective, rel=1e-6)
     lines = "\n".join([*sentences_of(output), *next(iter(Method.of(output))).limits])
     assert "separates yellow from red lamps by 234 DN" in lines

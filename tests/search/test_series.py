@@ -16,9 +16,9 @@ from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import SmoothDesign
-from sweep.search.limit import limit_of, reason_without_bound
 from sweep.search.problem import Problem, starting_points
 from sweep.search.solver import smooth_objective
+from sweep.search.upper_bound import reason_without_bound, upper_bound_of
 
 from ..build import issues, load, ran
 from .problems import STATES, best_of, best_random, problem_of, rows_at
@@ -129,17 +129,17 @@ def test_a_run_has_the_answer_in_each_scenario_and_its_bound_in_the_worst(tmp_pa
     assert list(found["scenario"]) == [f"bright background_cd_m2={cd}" for cd in (0, 2000, 9000)]
     assert rows["design_id"].is_unique
     assert found["filter_id"].nunique() == 1
-    bounded = found[found["limit"].notna()]
+    bounded = found[found["upper_bound"].notna()]
     assert len(bounded) == 1
     problem = study.problem(study.search)
     x = found[list(study.search.space.parameters)].iloc[0].to_numpy(dtype=float)
     values = [smooth_objective(problem.in_scenario(number), x) for number in range(3)]
     assert int(np.argmin(values)) == found.index.get_loc(bounded.index[0])
     # The bound of any scenario is one of the worst value; and no random filter's worst is above it.
-    bounds = [limit_of(problem.in_scenario(number)).proven for number in range(3)]
+    bounds = [upper_bound_of(problem.in_scenario(number)).proven for number in range(3)]
     assert min(values) <= min(bounds) * (1 + 1e-9)
-    assert bounded["limit"].iloc[0] == pytest.approx(bounds[int(np.argmin(values))], rel=1e-6)
-    assert best_random(problem, 50).objective <= bounded["limit"].iloc[0]
+    assert bounded["upper_bound"].iloc[0] == pytest.approx(bounds[int(np.argmin(values))], rel=1e-6)
+    assert best_random(problem, 50).objective <= bounded["upper_bound"].iloc[0]
     assert min(values) > max(smooth_objective(problem, problem.from_unit(u)) for u in starting_points(problem, 8, 5))
 
 

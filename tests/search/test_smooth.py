@@ -14,8 +14,8 @@ from sweep.designs.tolerance import NONE, Tolerance
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
-from sweep.search.limit import limit_of, reason_without_bound
 from sweep.search.problem import Problem, starting_points
+from sweep.search.upper_bound import reason_without_bound, upper_bound_of
 
 from .problems import PROBLEM, best_of, csd_of, problem_of, rows_at
 
@@ -79,10 +79,10 @@ def test_a_search_in_a_far_scene_stays_below_its_limit() -> None:
     far = {"target": {"distance_m": 250, "fov_deg": 30}, "optics": {"f_number": 2.0}}
     setup = replace(PROBLEM.setup, scene=Scene.model_validate(far))
     problem = replace(PROBLEM, setup=setup)
-    limit = limit_of(problem)
+    limit = upper_bound_of(problem)
     assert smooth_csd(setup, limit.curve[None, None], ("yellow", "red"))[0] == pytest.approx(limit.attained, rel=1e-12)
     assert 0.7 * limit.proven < best_of(problem, 4, 125).objective <= limit.proven
-    assert limit.proven < limit_of(PROBLEM).proven  # blur takes separation away from every filter
+    assert limit.proven < upper_bound_of(PROBLEM).proven  # blur takes separation away from every filter
     mixed = replace(problem, setup=setup.with_camera(pixel=Pixel(crosstalk=0.01)))
     assert reason_without_bound(mixed) == "crosstalk mixes the modified channel into others"
 

@@ -14,11 +14,11 @@ from sweep.camera.exposure import may_be_brightest
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.runs import run_study
-from sweep.search.limit import limit_of
 from sweep.search.problem import Problem, best_feasible, starting_points
 from sweep.search.solver import search_from
 from sweep.search.tiles import EXCLUDED, SEARCHED, Tiles, search_tiles
 from sweep.search.trade_off import Effort
+from sweep.search.upper_bound import upper_bound_of
 from sweep.study import Study, load_study
 
 from ..build import load
@@ -67,7 +67,7 @@ def brute_force(problem: Problem, starts: int = 8, evaluations: int = 80) -> flo
 
 
 def check_against_brute_force(problems: list[Problem], tiles: Tiles) -> None:
-    best, limits = tiles.best(0), [tile.limit for tile in tiles.at[0]]
+    best, limits = tiles.best(0), [tile.upper_bound for tile in tiles.at[0]]
     values = np.array([brute_force(problem) for problem in problems])
     assert best is not None
     assert best.objective >= values.max() * (1 - 1e-3)
@@ -101,7 +101,7 @@ def test_levels_of_light_have_no_better_filter_at_more(tmp_path: Path) -> None:
     for level, one in enumerate(best):
         assert one is not None
         assert one.cfa_sensitivity >= (0.4, 0.45, 0.5, 0.55)[level] - 1e-8
-        assert one.objective <= tiles.limit(level) * (1 + 1e-9)
+        assert one.objective <= tiles.upper_bound(level) * (1 + 1e-9)
     assert len(problems) == 30
 
 
@@ -133,7 +133,7 @@ def test_no_filter_exceeds_a_bound_where_it_sets_the_exposure(tmp_path: Path, na
     problem = replace(problem, constraints=bounds, objective=Objective(minimum={name: 1.0}))
     assert may_be_brightest(problem.setup)
     levels = (0.2, 0.6, 0.95)
-    limit = limit_of(problem, 0.05, 500, levels)
+    limit = upper_bound_of(problem, 0.05, 500, levels)
     assert 0 < limit.attained <= limit.proven
     assert brute_force(problem, 6, 60) <= limit.proven * (1 + 1e-9)
     for level, proven in zip(levels, limit.elsewhere, strict=True):
@@ -157,7 +157,7 @@ def test_a_least_sensitivity_below_that_of_others_keeps_their_exposure(tmp_path:
         p for p, s in zip(problems_of(study), study.search.tiles, strict=True) if s.name == "stopband RGGN(Y)"
     )  # type: ignore[union-attr]
     problem = replace(problem, constraints={"sensitivity": Bound(max=0.4)})
-    limit = limit_of(problem)
+    limit = upper_bound_of(problem)
     assert brute_force(problem, 8, 100) <= limit.proven * (1 + 1e-9)
     assert limit.curve is not None
     assert csd_of(problem.setup, limit.curve[None, None])[0] == pytest.approx(limit.attained, rel=1e-9)
@@ -173,7 +173,7 @@ def test_a_run_over_tiles_has_its_tables_and_resumes_from_its_own_study(tmp_path
     assert set(tiles["status"]) <= {"searched", "excluded", "too dark", "impossible"}
     best = tiles[tiles["best"]]
     assert len(best) == 3
-    assert (best["objective"] <= best["limit"] * (1 + 1e-9)).all()
+    assert (best["objective"] <= best["upper_bound"] * (1 + 1e-9)).all()
     rows = pd.read_parquet(tmp_path / "out" / "results.parquet")
     answer = rows[rows["kind"] == "search"].iloc[0]
     assert answer["space"] == best["space"].iloc[0]

@@ -44,7 +44,9 @@ def test_a_grid_of_500_cameras_is_500_single_studies(tmp_path: Path) -> None:
     grid = rows_of(load(tmp_path, f"{HEAD}scenarios: {{s: {{{FAR}, each: {{{each}}}}}}}\n"), tmp_path / "grid")
     assert len(grid) == 2 * 500
     assert grid["value"].isna().all()
-    compared = [name for name in grid if grid[name].dtype == float and name not in (*GRID, "value", "promised_dn")]
+    compared = [
+        name for name in grid if grid[name].dtype == float and name not in (*GRID, "value", "omitted_effects_bound_dn")
+    ]
     of_grid = grid.set_index([*GRID, "name"])
     for bits, pitch, well, f_number in product(*GRID.values()):
         text = f"{HEAD}pixel: {{bits: {bits}, pitch_um: {pitch}, well_e: {well}}}\n"

@@ -306,7 +306,7 @@ def test_published_names_are_checked(tmp_path: Path) -> None:
         ("    RGGB: {csd", "    RGBG: {csd", "did you mean 'RGGB'"),
         ("RGGB: {csd_green_yellow", "RGGB: {csd_green_yelow", "did you mean 'csd_green_yellow'"),
         ("urban: {object_resolution_px", "urban: {sensitivity", "allowed: object_resolution_px"),
-        ("at: RYN2Cy", "at: RYN5Cy", "unknown built-in filter"),
+        ("at: paper_N2", "at: RYN5Cy", "unknown built-in filter"),
     ):
         with pytest.raises(StudyError, match=word):
             loaded(old, new)

@@ -24,7 +24,7 @@ from ..commanded import commanded
 
 KEYS: dict[str, Any] = {"study": "tasks", "sensor": "ar0820", "lights": "tl16", "cfas": ["RGGB"]}
 LEAF = {"classes": {"leaf": "canopy", "ground": ["soil", "asphalt"]}, "under": "d65"}
-FILM = {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": "G", "at": "RYN4Cy"}
+FILM = {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": "G", "at": "paper_N4"}
 FILM_OF_LAYERS = {**FILM, "technology": {"interference": {"effective_index": 1.8}}}
 FAULTS: list[tuple[dict[str, Any], str]] = [
     ({"tasks": ["colour"]}, "tasks.shipped: unknown task (got 'colour'); allowed: color, low_light"),

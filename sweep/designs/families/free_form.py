@@ -85,7 +85,15 @@ class FreeForm(Family):
         if nodes_nm.size < 2:
             raise SweepError(ValidationIssue("a free-form filter needs two nodes or more", value=nodes_nm.tolist()))
         self.nodes_nm = nodes_nm
-        self.parameters = tuple(Parameter(f"transmission_{node:g}_nm", 0, 1, default=None) for node in nodes_nm)
+        self.parameters = tuple(
+            Parameter(
+                f"transmission_{node:g}_nm",
+                0,
+                1,
+                meaning=f"transmission at {node:g} nm, relative to the replaced curve",
+            )
+            for node in nodes_nm
+        )
         self._made_of = wavelength_nm, base
         nominal_nm = production_error.nominal_nm(wavelength_nm)
         inside = (nominal_nm >= nodes_nm[0]) & (nominal_nm <= nodes_nm[-1])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from copy import copy
+from dataclasses import replace
 from typing import Literal, Self
 
 import numpy as np
@@ -33,10 +34,13 @@ _LN10 = math.log(10)
 _MOST_ABSORBANCE = 6.0
 THICKNESS_UM = 0.8
 """Usual thickness of a color resist, which absorbances of colorants are stated for."""
+_BASELINE = Parameter(
+    "baseline_absorbance", 0, _MOST_ABSORBANCE, default=0.0, meaning="decadic absorbance at all wavelengths"
+)
 _BANDS: tuple[Parameter, ...] = (
-    Parameter("peak_nm", 200, 2000),
-    Parameter("fwhm_nm", 1, 500),
-    Parameter("absorbance", 0, _MOST_ABSORBANCE),
+    Parameter("peak_nm", 200, 2000, unit="nm", meaning="peak of the absorption band"),
+    Parameter("fwhm_nm", 1, 500, unit="nm", meaning="full width of the band at half of its absorbance"),
+    Parameter("absorbance", 0, _MOST_ABSORBANCE, meaning="decadic absorbance at the peak"),
 )
 
 
@@ -125,11 +129,11 @@ class AbsorptionBands(Absorbing):
         numbers = [""] if bands == 1 else [str(number) for number in range(1, bands + 1)]
         split = [name.name.partition("_") for name in _BANDS]
         named = [
-            Parameter(f"{first}{number}{bar}{unit}", known.low, known.high)
+            replace(known, name=f"{first}{number}{bar}{unit}")
             for number in numbers
             for known, (first, bar, unit) in zip(_BANDS, split, strict=True)
         ]
-        self.parameters = (*named, Parameter("baseline_absorbance", 0, _MOST_ABSORBANCE, default=0.0))
+        self.parameters = (*named, _BASELINE)
 
     @classmethod
     def of_study(
@@ -226,11 +230,11 @@ class Mixture(Absorbing):
                 parameter
                 for slot in range(1, at_most + 1)
                 for parameter in (
-                    Parameter(f"colorant_{slot}", 1, last),
-                    Parameter(f"absorbance_{slot}", 0, _MOST_ABSORBANCE),
+                    Parameter(f"colorant_{slot}", 1, last, meaning="number of a colorant in the catalog"),
+                    Parameter(f"absorbance_{slot}", 0, _MOST_ABSORBANCE, meaning="its decadic absorbance at the peak"),
                 )
             ),
-            Parameter("thickness_um", 0.01, 100, default=THICKNESS_UM),
+            Parameter("thickness_um", 0.01, 100, default=THICKNESS_UM, unit="um", meaning="thickness of the film"),
         )
 
     @property

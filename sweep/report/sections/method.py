@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from ...results.facts import SearchFacts
 from ...results.output import Output
 from ...results.tables import REFERENCE
+from ..scenes import left_out_in_words
 from ..section import Section
 from ..words import digits, number, quantity
 
@@ -32,18 +33,17 @@ class Method(Section):
         column = output.trade_off[0]
         of = output.columns[column.of] if column.extreme else column
         computed = dict.fromkeys(effect for plan in facts.plans.values() for effect in plan.computed)
-        bound_dn = max(plan.error_bound_dn for plan in facts.plans.values())
-        left_out = {
-            effect.effect for plan in facts.plans.values() for effect in plan.effects if not effect.computed
-        } - computed.keys()
         several = f" in {len(output.scenarios)} scenes" if len(output.scenarios) > 1 else ""
         plain = output.kind(REFERENCE)["filter_id"].nunique()
         lines = [
             f"{quantity(of)[:1].upper()}{quantity(of)[1:]} ({of.name} in the files): {of.meaning}.",
             f"Computed: {facts.filters:,} filters, {plain} of them plain CFAs,{several} with {', '.join(computed) or 'no effect but the curves'}.",
-            f"Left out: {len(left_out)} effects, which change a separation by at most {digits(bound_dn)} DN."
-            if bound_dn
-            else f"Left out: {len(left_out)} effects, none of which changes a separation.",
+            left_out_in_words(
+                (effect for plan in facts.plans.values() for effect in plan.effects),
+                max(plan.error_bound_dn for plan in facts.plans.values()),
+                max(plan.tolerance_dn for plan in facts.plans.values()),
+                facts.seconds_of_effects,
+            ),
         ]
         if facts.check is not None:
             rows = "1 row" if facts.check.rows == 1 else f"{facts.check.rows:,} rows"
@@ -84,29 +84,30 @@ class Method(Section):
 
 def limit_line(output: Output, search: SearchFacts) -> str:
     """Return the upper bound with its filters and response."""
-    if search.no_limit is not None or search.limit_proven is None:
-        return f"Upper bound: none computed ({search.no_limit})."
-    proven = output.goal.format_bound(search.limit_proven)
+    if search.no_upper_bound is not None or search.upper_bound_proven is None:
+        return f"Upper bound: none computed ({search.no_upper_bound})."
+    proven = output.goal.format_bound(search.upper_bound_proven)
     gap = "nothing is left to gain"
     if search.gap is not None:
         gap = f"the search's answer is {100 * search.gap:.1f} % below it"
-    without = f" but {', '.join(search.limit_left_out)}" if search.limit_left_out else ""
+    without = f" but {', '.join(search.upper_bound_left_out)}" if search.upper_bound_left_out else ""
     proof = f"{proven} (proven)"
-    if search.limit_attained is not None:
-        left = f"{search.limit_proven - search.limit_attained:.2g} {output.goal.unit}".rstrip()
+    if search.upper_bound_attained is not None:
+        left = f"{search.upper_bound_proven - search.upper_bound_attained:.2g} {output.goal.unit}".rstrip()
         proof += f", and one filter comes within {left} of it"
-    if search.limit_open_parts:
-        programs, parts = search.limit_programs, search.limit_open_parts
+    if search.upper_bound_open_parts:
+        programs, parts = search.upper_bound_programs, search.upper_bound_open_parts
         proof += f", but it may not be the least one: {parts} parts are open after {programs} linear programs"
-    levels = search.front_limits_open
+    levels = search.front_upper_bounds_open
     technology = (output.study.sweeps | output.study.boxes)[search.space].technology
     moved = "" if technology is None else f", as {technology.description}"
-    if output.goal.extreme and output.study.production.tolerance and "edge shifts" not in search.limit_left_out:
+    if output.goal.extreme and output.study.production.tolerance and "edge shifts" not in search.upper_bound_left_out:
         moved += ", whose whole shape production moves"
+    box = " (or what the box reaches, where that is more)" if search.upper_bound_of_box else ""
     where = f"{search.channel} of {search.cfa}{f' in {search.scenario}' if len(output.scenarios) > 1 else ''}"
     return (
         f"Upper bound of {output.goal.words} for any filter in {where}: {proof}; {gap}. This is for filters between "
-        f"the least transmission and the curve that they replace{moved}, under the same constraints{without}, before "
+        f"the least transmission and the curve that they replace{box}{moved}, under the same constraints{without}, before "
         "clipping and quantization."
         + (f" At {levels} levels of the front it may not be the least one." if levels else "")
     )

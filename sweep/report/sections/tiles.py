@@ -49,7 +49,9 @@ class AllTiles(Section):
         shown = [
             table[of_level & table["best"]].iloc[0].to_dict() for of_level in levels if (of_level & table["best"]).any()
         ]
-        proven = [float(table.loc[of_level, "limit"].max()) for of_level in levels if (of_level & table["best"]).any()]
+        proven = [
+            float(table.loc[of_level, "upper_bound"].max()) for of_level in levels if (of_level & table["best"]).any()
+        ]
         yield cls(output.goal, tuple(shown), tuple(proven), search.tiles, bound_conditions(output))
 
     @property

@@ -148,7 +148,7 @@ class TradeOff(Section):
             points=tuple(points),
             cloud=_cloud(output, scenario, column, best),
             traced=_line(output, scenario, "objective", best),
-            bounds=_line(output, scenario, "limit", best) if bounds_figure(output, scenario, str(best["cfa"])) else None,
+            bounds=_line(output, scenario, "upper_bound", best) if bounds_figure(output, scenario, str(best["cfa"])) else None,
             own=tuple(_least(output, best, rggb)),
             lost=tuple(_lost(output, best, [*shown, *leaders.others])),
             by_pixel=_by_pixel(column, best, rggb),
@@ -411,4 +411,5 @@ def _below(output: Output, best: Row) -> str:
     search = output.provenance.search
     base = None if search is None else (output.study.sweeps | output.study.boxes)[search.space].base
     alike = " that moves like it" if is_angle_dependent(output, best) else ""
-    return f"{alike} that stays below {base}" if base else alike
+    box = " or the box" if search is not None and search.upper_bound_of_box else ""
+    return f"{alike} that stays below {base}{box}" if base else alike

@@ -15,6 +15,8 @@ BUILT_IN_RANGE_NM = (400.0, 700.0)
 """Wavelengths that the surrogate curves are stated for; an IR cut filter closes the rest."""
 MODELED = ("ar0820", "tl16", "tl16_deep_red")
 """Sensors and lights that are modeled between these wavelengths; others say themselves where they end."""
+FITS = 12
+"""Further fits, `ar0820@1` with `tl16@1` and so on."""
 LEAK_NODES_NM = (400.0, 600.0, 700.0)
 
 
@@ -85,6 +87,28 @@ class SurrogateParameters(Section):
 def surrogate_parameters(name: str = "surrogate") -> SurrogateParameters:
     """Read a parameter file of the package."""
     return SurrogateParameters.model_validate(parameter_tree(name))
+
+
+@cache
+def surrogate_fit(number: int) -> SurrogateParameters:
+    """Return another fit of the same model, from another start, that meets every printed figure, too: 1 to FITS."""
+    tree = parameter_tree("surrogate")
+    head, *rows = files(__package__).joinpath("surrogate_fits.csv").read_text(encoding="utf-8").splitlines()
+    column = head.split(",").index(str(number))
+    for row in rows:
+        path, *numbers = row.split(",")
+        *parents, last = [int(key) if key.isdigit() else key for key in path.split(".")]
+        node: Any = tree
+        for key in parents:
+            node = node[key]
+        node[last] = float(numbers[column - 1])
+    return SurrogateParameters.model_validate(tree)
+
+
+def parameters_of(name: str | None) -> SurrogateParameters:
+    """Return the parameters of a built-in sensor or lights: those of its fit (`ar0820@3`), or the shipped ones."""
+    _, _, number = (name or "").partition("@")
+    return surrogate_fit(int(number)) if number else surrogate_parameters()
 
 
 def parameter_tree(name: str) -> dict[str, Any]:

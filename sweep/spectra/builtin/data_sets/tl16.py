@@ -6,13 +6,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ....base.types import PerWavelength
 from ...lights import Lights, make_lights
 from ...spectrum import WavelengthGrid
 from ..led import led_photons
-from ..surrogate import BUILT_IN_RANGE_NM, SurrogateParameters, surrogate_parameters
+from ..surrogate import BUILT_IN_RANGE_NM, SurrogateParameters, surrogate_fit, surrogate_parameters
 
 LAMPS = {"us": 11, "germany": 5}
 ORANGE_LAMPS = {"us": 3}
@@ -43,6 +45,11 @@ def red_led(region: str, wavelength_nm: PerWavelength, peak_nm: float) -> PerWav
 def lights(grid: WavelengthGrid) -> Lights:
     """Return the signals of `tl16` with the package's parameters."""
     return tl16(grid, surrogate_parameters())
+
+
+def tl16_of_fit(number: int, grid: WavelengthGrid) -> Lights:
+    """Return the signals with the parameters of another fit."""
+    return replace(tl16(grid, surrogate_fit(number)), name=f"tl16@{number}")
 
 
 def range_nm() -> tuple[float, float]:

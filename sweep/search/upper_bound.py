@@ -1,12 +1,13 @@
 """Upper bound on any filter in one modified channel, not only on those of a family.
 
-It holds for every N between the least transmission and the base curve that meets the study's constraints on slope,
-sensitivities and CSDs, whichever of two signals N makes the brighter one, for the response before clipping and
-quantization in the scene of the search. For d' it is a bound with the least noise (`least_noise.py`), which no filter
-need approach. The result is a bracket: a filter that attains the lower end, and linear programs which prove that no
-filter is above the upper end. Worst cases of CSDs are over the population of the lights, and over production where
-that moves the whole shape of a filter (`perturbed.py`). Constraints that only some families have (widths of edges and
-bands) are left out, and so are other worst cases: with more filters the upper end stays true.
+It holds for every N between the least transmission and the base curve (or the box, where that reaches above it) that
+meets the study's constraints on slope, sensitivities and CSDs, whichever of two signals N makes the brighter one, for
+the response before clipping and quantization in the scene of the search. For d' it is a bound with the least noise
+(`least_noise.py`), which no filter need approach. The result is a bracket: a filter that attains the lower end, and
+linear programs which prove that no filter is above the upper end. Worst cases of CSDs are over the population of the
+lights, and over production where that moves the whole shape of a filter (`perturbed.py`). Constraints that only some
+families have (widths of edges and bands) are left out, and so are other worst cases: with more filters the upper end
+stays true.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from ..metrics.quantity import DN, WORST_CASE
 from ..metrics.smooth import smooth_csd, smooth_response
 from ..metrics.smooth_noise import smooth_detectability
 from .certificate import ROUNDING
-from .perturbed import all_ways, perturbed_filters
+from .perturbed import all_ways, highest, perturbed_filters, reaches_above
 from .problem import Problem
 
 if TYPE_CHECKING:
@@ -52,12 +53,12 @@ _SHARES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 
 
 @dataclass(frozen=True)
-class Limit:
+class UpperBound:
     """Upper bound, and a filter near it, in the objective's unit.
 
     `attained`: objective of `curve`, evaluated like any design; -inf if no feasible filter is known; `proven`: upper
     bound on any filter; -inf if no filter meets the constraints; `open_parts`: parts of the proof that were left open,
-    so that the bracket is wider; 0 if none.
+    so that the bracket is wider; 0 if none; `of_box`: of filters that may exceed the replaced curve where the box does.
     """
 
     attained: float
@@ -67,14 +68,15 @@ class Limit:
     programs: int = 0
     open_parts: int = 0
     elsewhere: tuple[float, ...] = ()
+    of_box: bool = False
 
 
-def limit_of(
+def upper_bound_of(
     problem: Problem,
     tolerance_dn: float = 1e-3,
     most_programs: int = _MOST_PROGRAMS,
     sensitivities: Sequence[float] = (),
-) -> Limit:
+) -> UpperBound:
     """Compute the upper bound of a problem with one modified channel.
 
     `tolerance_dn`: width of the bracket, DN (1e-6 for an objective without a CSD); `most_programs`: linear programs,
@@ -83,16 +85,16 @@ def limit_of(
     """
     refused = reason_without_bound(problem)
     if refused is not None:
-        raise SweepError(ValidationIssue(f"no limit: {refused}"))
+        raise SweepError(ValidationIssue(f"no upper bound: {refused}"))
     effort = tolerance_dn, most_programs, sensitivities
-    if may_be_brightest(problem.setup):
-        return _limit_of_exposures(problem, *effort)
-    return _limit_of(problem, *effort)
+    brightest = may_be_brightest(problem.setup, _most_sensitive(problem, stated=False))
+    found = (_limit_of_exposures if brightest else _limit_of)(problem, *effort)
+    return replace(found, of_box=reaches_above(problem))
 
 
 def _limit_of_exposures(
     problem: Problem, tolerance_dn: float, most_programs: int, sensitivities: Sequence[float]
-) -> Limit:
+) -> UpperBound:
     """Compute the upper bound where the modified channel may be the brightest one on white and set the exposure.
 
     Then the exposure falls with its sensitivity s, and distances with the exposure. So filters with s from a to b have
@@ -121,19 +123,20 @@ def _limit_of_exposures(
     asked = [max(least, dim), inner[len(inner) // 2]] if inner else []
     ends = sorted({least, most, *asked})
     parts = [part(a, b) for a, b in pairwise(ends)]
-    while sum(p.limit.programs for p in parts) < most_programs:
-        highest, attained = max(parts, key=lambda p: p.limit.proven), max(p.limit.attained for p in parts)
+    while sum(p.upper_bound.programs for p in parts) < most_programs:
+        highest, attained = max(parts, key=lambda p: p.upper_bound.proven), max(p.upper_bound.attained for p in parts)
         a, b = highest.least, highest.most
-        loose = max(_LOOSE * highest.limit.proven, tolerance_dn)
-        if b <= max(dim, a * (1 + _LOOSE)) or highest.limit.proven - attained <= loose:
+        loose = max(_LOOSE * highest.upper_bound.proven, tolerance_dn)
+        if b <= max(dim, a * (1 + _LOOSE)) or highest.upper_bound.proven - attained <= loose:
             break
         parts.remove(highest)
         middle = dim if a < dim else (a + b) / 2
         parts += [part(a, middle), part(middle, b)]
-    best, limits = max((p.limit for p in parts), key=lambda limit: limit.attained), [p.limit for p in parts]
+    best, limits = max((p.upper_bound for p in parts), key=lambda limit: limit.attained), [p.upper_bound for p in parts]
     best = best if best.attained > -np.inf else replace(best, curve=None)
     elsewhere = [
-        max((p.limit.elsewhere[k] for p in parts if p.most >= s), default=-np.inf) for k, s in enumerate(sensitivities)
+        max((p.upper_bound.elsewhere[k] for p in parts if p.most >= s), default=-np.inf)
+        for k, s in enumerate(sensitivities)
     ]
     return replace(
         best,
@@ -149,10 +152,10 @@ class _Part(NamedTuple):
 
     least: float
     most: float
-    limit: Limit
+    upper_bound: UpperBound
 
 
-def _limit_of(problem: Problem, tolerance_dn: float, most_programs: int, sensitivities: Sequence[float]) -> Limit:
+def _limit_of(problem: Problem, tolerance_dn: float, most_programs: int, sensitivities: Sequence[float]) -> UpperBound:
     """Compute the upper bound where the exposure does not depend on the filter."""
     relaxed, left_out = _relaxed(problem)
     distances = any(relaxed.quantities[name].distance_kind for name in relaxed.objective.weights)
@@ -170,7 +173,7 @@ def _limit_of(problem: Problem, tolerance_dn: float, most_programs: int, sensiti
     least = relaxed.constraints.get(SENSITIVITY)
     from_here = -np.inf if not program.noisy or least is None or least.min is None else least.min
     elsewhere = tuple(proof.proven_at(program, s) if s >= from_here else np.inf for s in sensitivities)
-    return Limit(attained, proof.proven, curve, left_out, solved, proof.open_parts, elsewhere)
+    return UpperBound(attained, proof.proven, curve, left_out, solved, proof.open_parts, elsewhere)
 
 
 def check_bound(value: float, proven: float, where: str = "") -> None:
@@ -210,7 +213,7 @@ def _proof(problem: Problem, pool: Pool, tolerance: float, most_programs: int) -
     program = FilterProgram(problem, pool)
 
     def value(curve: PerWavelength, inside: PerWavelength | None) -> tuple[float, PerWavelength]:
-        attained, moved = _inside(program.problem, np.clip(curve, program.low, program.base), inside, pool)
+        attained, moved = _inside(program.problem, np.clip(curve, program.low, program.high), inside, pool)
         return (program.reaches(moved) if program.noisy and attained > -np.inf else attained), moved
 
     return program, SideSearch(program, value, tolerance, most_programs).run()
@@ -264,8 +267,8 @@ def reason_without_bound(problem: Problem) -> str | None:
         (lambda: bool(unknown), f"{', '.join(unknown)} {why}"),
         (lambda: problem.setup.camera.pixel.crosstalk > 0, "crosstalk mixes the modified channel into others"),
         (
-            lambda: bool((_top(problem) > base * (1 + ROUNDING)).any()),
-            "filters of the box may exceed the curve that they replace",
+            lambda: bool((_top(problem) > base * (1 + ROUNDING)).any()) and not _plain(problem),
+            "filters of the box may exceed the curve that they replace, and the bound is of more than plain CSDs",
         ),
         (
             lambda: bool((family.lower(problem.low, problem.high)[0] < -ROUNDING * base).any()),
@@ -305,10 +308,20 @@ def _scales(problem: Problem) -> bool:
     return not (noisy or _moves(problem) or (dark and (bound is None or not bound.min)))
 
 
-def _most_sensitive(problem: Problem) -> float:
-    """Return the largest sensitivity that the study allows, 1 if it states none."""
-    bound = problem.constraints.get(SENSITIVITY)
-    return 1.0 if bound is None or bound.max is None or _moves(problem) else min(1.0, bound.max)
+def _most_sensitive(problem: Problem, *, stated: bool = True) -> float:
+    """Return the largest sensitivity of the filters, and that the study allows if it has `stated` one."""
+    camera, most = problem.setup.camera, 1.0
+    if reaches_above(problem):
+        most = float(camera.grid.integrate(highest(problem)) / camera.grid.integrate(camera.base_qe[0]))
+    bound = problem.constraints.get(SENSITIVITY) if stated else None
+    return most if bound is None or bound.max is None or _moves(problem) else min(most, bound.max)
+
+
+def _plain(problem: Problem) -> bool:
+    """Return whether all that is asked for is nominal, without noise, and at one brightness and one place."""
+    asked = [problem.quantities[name] for name in (*problem.objective.weights, *problem.constraints)]
+    nominal = all(one.distance_kind in ("", DN) and not one.extreme for one in asked)
+    return nominal and not (problem.setup.all_phases or problem.setup.all_heights)
 
 
 def _moves(problem: Problem) -> bool:
@@ -367,9 +380,9 @@ def _top(problem: Problem) -> PerWavelength:
 
 
 def _clips(problem: Problem) -> bool:
-    """Return whether the response of the base curve, the largest of all filters, is clipped."""
+    """Return whether the response of the highest curve, the largest of all filters, is clipped."""
     setup = problem.setup
-    smooth = smooth_response(setup, setup.camera.base_qe[None])
+    smooth = smooth_response(setup, highest(problem)[None, None])
     top_dn = unquantized(np.array(setup.camera.pixel.saturation_e), setup.camera.pixel)
     return bool((smooth > top_dn).any())
 
