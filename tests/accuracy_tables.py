@@ -1,4 +1,4 @@
-"""What accuracy costs, and the hard cases, as tables: `make accuracy` writes them into tests/README.md."""
+"""What accuracy costs, and the hard cases, as tables: `make accuracy` writes them into README.md and tests/README.md."""
 
 from __future__ import annotations
 
@@ -90,7 +90,9 @@ def main(folder: Path) -> None:
     """Print the tables of a folder that `make accuracy` made, and copy its picture."""
     measured = pd.read_parquet(folder / "accuracy.parquet")
     cases = json.loads((folder / "hard_cases.json").read_text())
-    tests = ROOT / "tests" / "README.md"
+    tests, readme = ROOT / "tests" / "README.md", ROOT / "README.md"
+    stable = f"{len(cases)} [hard cases](tests/README.md#hard-cases) stay within errors that are derived for them."
+    readme.write_text(with_block(readme.read_text(), "cost", [*cost_table(measured), "", stable]))
     text = with_block(tests.read_text(), "cost", cost_table(measured))
     text = with_block(text, "scenes", scene_table(measured))
     tests.write_text(with_block(text, "hard cases", hard_table(cases)))

@@ -20,11 +20,15 @@ from sweep.report.page import answer_of as answer_of_run
 from sweep.report.page import limits_of, sections_of
 from sweep.report.sections.deeper_reds import DeeperReds
 from sweep.report.sections.price import Price
+from sweep.report.sections.vision import Vision
+from sweep.report.vision import format_interval, ranks_of
+from sweep.vision.readers import OBSERVER
 
 STUDIES = Path(__file__).parent.parent / "studies"
 
 PICTURES = (
     "stopband",
+    "surrogates",
     "least_loss",
     "least_loss_by_pixel",
     "tiles",
@@ -102,6 +106,13 @@ def with_run(text: str, folder: Path) -> str:
     return block.sub(lambda found: f"{found[1]}\n{body}\n\n{found[2]}", text)
 
 
+def with_rank(text: str, folder: Path) -> str:
+    """The README with how the CSD ranks designs as the ideal observer does."""
+    (benchmark,) = (section.benchmark for section in Vision.of(read_output(folder)) if isinstance(section, Vision))
+    rank = ranks_of(benchmark, OBSERVER).between["csd"]
+    return re.sub(r"(<!-- rank: vision -->).*?(<!-- end -->)", rf"\g<1>{format_interval(rank)}\g<2>", text)
+
+
 def gallery(rows: str) -> str:
     """Text of the gallery, from the table of `studies/README.md`."""
     parts = [
@@ -151,6 +162,8 @@ def main() -> None:
                 document.write_text(with_answer(document.read_text(encoding="utf-8"), study, answer), encoding="utf-8")
             if study == "stopband":
                 README.write_text(with_run(README.read_text(encoding="utf-8"), Path(folder) / study), encoding="utf-8")
+            if study == "vision":
+                README.write_text(with_rank(README.read_text(encoding="utf-8"), Path(folder) / study), encoding="utf-8")
             copy_picture(Path(folder) / study, STUDIES / "figures" / f"{study}.png")
     text = gallery((STUDIES / "README.md").read_text(encoding="utf-8"))
     (STUDIES / "guide" / "gallery.md").write_text(text, encoding="utf-8")

@@ -57,7 +57,7 @@ def test_the_readme_has_the_answer_of_its_run(finished: FinishedFolder) -> None:
     assert with_run(README, finished("stopband")) == README
     words = re.sub(r"<!--.*?-->|```.*?```|^\|.*\|$", "", README, flags=re.DOTALL | re.MULTILINE).split()
     assert len(words) <= 800
-    assert README.count("](studies/figures/") == 2
+    assert README.count("](studies/figures/") == 3
 
 
 def test_the_figure_of_measured_films_is_that_of_a_search(tmp_path: Path) -> None:

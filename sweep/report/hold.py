@@ -69,12 +69,12 @@ def curves_in_words(output: Output) -> str:
     facts, count = output.provenance, sum(map(len, output.curves.bundles.values()))
     relative = "" if response_of(output.curves.sensor) == QE else " (relative, taken as quantum efficiencies)"
     sensor = (
-        f"surrogate curves of {facts.sensor.name} (**modeled, not measured**)"
+        f"surrogate curves of {facts.sensor.name} (**modeled, not measured**; `surrogates` has further fits)"
         if facts.sensor.surrogate
         else f"curves of {facts.sensor.name}{relative}"
     )
     lights = (
-        f"{count} surrogate lamps {facts.lights.name} (modeled)"
+        f"{count} surrogate lamps {facts.lights.name} (modeled; photons beside white assumed)"
         if facts.lights.surrogate
         else f"{count} lamps of {facts.lights.name}"
     )

@@ -82,4 +82,4 @@ class Colors(Section):
                     height=260,
                 )
             )
-        return Picture(tuple(panels), "Mean color error over the SNR of gray.", "Better is down and to the right.")
+        return Picture(tuple(panels), "Mean color error over the SNR of gray.", "Better: down, right.")

@@ -37,8 +37,8 @@ class SensorCurves(Section):
         facts = output.provenance
         counts = {kind: len(photons) for kind, photons in output.curves.bundles.items()}
         yield cls(
-            _name(facts.sensor),
-            _name(facts.lights),
+            facts.sensor.name,
+            facts.lights.name,
             output.curves.wavelength_nm,
             output.curves.sensor,
             lamp_areas(output),
@@ -63,8 +63,3 @@ class SensorCurves(Section):
             f"The sensor's {response_of(self.curves)} over the lamps.",
             f"Sensor {self.sensor}; lamps {self.lights} ({lamps}): areas, largest photon spectrum of each color.",
         )
-
-
-def _name(origin: object) -> str:
-    surrogate = getattr(origin, "surrogate", False)
-    return f"{getattr(origin, 'name', '')}{' (surrogate: modeled, not measured)' if surrogate else ''}"

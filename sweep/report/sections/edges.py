@@ -126,7 +126,7 @@ class Edges(Section):
         return Picture(
             (panel,),
             "Largest separation over two parameters.",
-            "Each place: the most of all filters with these two parameters that meet every constraint; gray: none does. Dark is more.",
+            "Each place: the most of all feasible filters with these two parameters; gray: none. Dark is more.",
         )
 
 

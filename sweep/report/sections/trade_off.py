@@ -248,8 +248,8 @@ class TradeOff(Section):
             )
         )  # fmt: skip
         alone = f"{self.best.name}: {of_column(self.column, self.best.separation)} at {amount(self.best.light, 'share')} of the light, beside other CFAs."
-        parts = ["Solid line: the best of the search at each level of light."] if self.traced is not None else []
-        parts += ["Dashed: the upper bound at each level."] if self.bounds is not None else []
+        parts = ["Solid: the best of the search at each light."] if self.traced is not None else []
+        parts += ["Dashed: the upper bound."] if self.bounds is not None else []
         parts += ["Small dots: swept designs on the front."] if self.cloud is not None else []
         parts += ["Areas: the lamps' spectra."] if self.filters is not None else []
         return Picture(tuple(panels), alone, " ".join(parts))
