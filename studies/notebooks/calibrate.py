@@ -8,7 +8,8 @@
 # %% [markdown]
 # # Where the built-in curves come from
 # The sensor `ar0820` and the lights `tl16` are models with 86 free parameters, fitted to the figures that the paper
-# prints: `published` in `studies/paper.yaml`. Or run: `python calibrate.py --starts 4 --output surrogate.yaml`.
+# prints: `published` in `studies/paper.yaml`. Or run: `python calibrate.py --starts 4 --output surrogate.yaml`, or
+# `--fits 12 --output surrogate_fits.csv`.
 
 # %%
 """Fit the built-in surrogate curves to the printed figures, and compare with the shipped ones.

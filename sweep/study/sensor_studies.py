@@ -126,6 +126,15 @@ def choose(document: Document, member: SensorAndLights) -> None:
         document.data.pop("pixels")
 
 
+def of_one_fit(section: StudySection) -> StudySection:
+    """Return the study with lamps of the same fit as its modeled sensor: the figures hold for both together."""
+    _, at, fit = (section.sensor.builtin or "").partition("@")
+    if not fit or section.lights.builtin != "tl16":
+        return section
+    lights = section.lights.model_copy(update={"builtin": f"tl16{at}{fit}"})
+    return section.model_copy(update={"lights": lights})
+
+
 def narrowed(section: StudySection, member: SensorAndLights) -> tuple[StudySection, list[str]]:
     """Return a member's study: the wavelengths that its curves have, and the CFAs that the sensor has.
 
@@ -143,9 +152,6 @@ def narrowed(section: StudySection, member: SensorAndLights) -> tuple[StudySecti
         grid = grid.model_copy(update={"start_nm": start, "stop_nm": stop})
         notes.append(f"{member.sensor}: curves from {start:g} to {stop:g} nm")
     changes: dict[str, Any] = {"wavelengths": grid}
-    _, at, fit = (section.sensor.builtin or "").partition("@")
-    if fit and section.lights.builtin == "tl16":  # the lamps of the same fit: the figures hold for both together
-        changes["lights"] = section.lights.model_copy(update={"builtin": f"tl16{at}{fit}"})
     names = _curve_names(section)
     if names is not None:
         changes |= _buildable(section, names)

@@ -16,7 +16,9 @@ from sweep.base.errors import OutputError
 from sweep.metrics.pareto import knee
 from sweep.report import make_report, read_output, summary_lines
 from sweep.report.explorer import explorer_data
+from sweep.report.sections.clouds import Clouds
 from sweep.report.sections.method import Method
+from sweep.results.dictionary import KEYS
 from sweep.results.facts import CheckFacts
 from sweep.study import load_study
 
@@ -54,6 +56,34 @@ def test_the_method_states_the_largest_difference_of_the_check(finished: Finishe
     said = "Checked: 3 rows at reference settings (4.2 times as long) differ by at most 0.300 DN; 0.1 DN is allowed."
     assert said in method.limits
     assert not check.passed
+
+
+def test_clouds_are_the_digital_numbers_of_all_lamps(finished: FinishedFolder) -> None:
+    output = read_output(finished("stopband"))
+    (clouds,) = Clouds.of(output)
+    assert isinstance(clouds, Clouds)
+    assert list(clouds.axes.items()) == [("RGGB", ("R", "G")), ("RYYCy", ("R", "Y")), ("best stopband", ("R", "N"))]
+    assert {kind: len(colors) for kind, colors in clouds.colors.items()} == {
+        "green": 16,
+        "yellow": 16,
+        "orange": 3,
+        "red": 16,
+    }
+    for name, (x, y) in clouds.axes.items():
+        (row,) = output.named_rows[output.named_rows["name"] == name]["design_id"]
+        points = output.points[output.points["design_id"] == row].set_index(["signal_type", "channel"])["dn"]
+        for kind, pair in clouds.clouds[name].items():
+            for channel, values in zip((x, y), pair, strict=True):
+                assert sorted(values) == sorted(points.loc[(kind, channel)])
+
+
+def test_every_column_of_the_rows_has_its_meaning(finished: FinishedFolder) -> None:
+    rows = pd.read_parquet(finished("stopband") / "results.parquet")
+    assert {*rows.columns} <= rows.attrs["meanings"].keys() | {"simulation_key"} | {*KEYS}
+    assert rows.attrs["units"] | {"left_nm": "nm", "depth": "", "upper_bound": "DN"} == rows.attrs["units"]
+    assert "left edge" in rows.attrs["meanings"]["left_nm"]
+    assert "pareto" not in rows
+    assert pd.read_parquet(finished("stopband") / "pareto.parquet")["pareto"].all()
 
 
 def test_a_dollar_in_a_name_is_no_formula() -> None:

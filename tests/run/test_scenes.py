@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from sweep.report import make_report, read_output
+from sweep.report.sections.method import Method
 from sweep.runs.audit import audit, audit_rows, sampled
 from sweep.study import Study, load_study
 
@@ -38,9 +40,14 @@ def test_scenes_are_planned_and_drawn(road: tuple[Study, Path]) -> None:
     assert "<svg" in (folder / "report.html").read_text()
     plans = output.provenance.plans
     assert frame["simulation_key"].iloc[0] == plans["road distance_m=150"].key
-    check = output.provenance.check
+    check, seconds = output.provenance.check, output.provenance.seconds_of_effects
     assert check is not None
     assert check.passed
+    assert seconds is not None
+    own_s, every_s = seconds
+    assert 0 < own_s < 10 * every_s
+    (said,) = (line for line in next(iter(Method.of(output))).limits if line.startswith("Left out: "))
+    assert re.search(r"at most [\d.e-]+ of \d+ DN, (no faster|[\d.]+ times faster, [\d.]+ s saved)\.$", said)
 
 
 @pytest.mark.slow

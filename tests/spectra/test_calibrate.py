@@ -11,7 +11,14 @@ import pandas as pd
 import pytest
 
 from sweep.runs import run_study
-from sweep.spectra.builtin.surrogate import SurrogateParameters, parameter_tree, surrogate_parameters
+from sweep.spectra.builtin.data_sets.tl16 import tl16
+from sweep.spectra.builtin.surrogate import (
+    FITS,
+    SurrogateParameters,
+    parameter_tree,
+    surrogate_fit,
+    surrogate_parameters,
+)
 from sweep.study import load_study
 
 from ..conftest import STUDIES, without_pictures
@@ -104,6 +111,29 @@ def test_a_fit_recovers_parameters_that_it_was_given(photon_ratio: float | None,
         for quantity, value in values.items():
             assert abs(found[row][quantity] - value) <= SCRIPT.allowed(quantity, value) / 2, (row, quantity)
     assert abs(objective.parameters(x).photon_ratio - truth["photon_ratio"]) < 0.010
+
+
+@pytest.mark.parametrize("number", range(1, FITS + 1))
+def test_every_further_fit_meets_every_printed_figure(number: int) -> None:
+    parameters = surrogate_fit(number)
+    found = SCRIPT.figures(parameters, SCRIPT.PRINTED)
+    figures = [(row, name, value) for row, values in SCRIPT.PRINTED.items() for name, value in values.items()]
+    assert len(figures) == 49
+    assert [f for f in figures if not abs(found[f[0]][f[1]] - f[2]) <= SCRIPT.allowed(*f[1:])] == []
+
+
+def test_a_fit_has_its_own_sensor_lamps_and_filters() -> None:
+    """Its figures hold for all of them together."""
+    shipped, fit = (load_study(STUDIES / "paper.yaml", changes={"sensor": name}) for name in ("ar0820", "ar0820@3"))
+    assert (fit.sensor.name, fit.lights.name) == ("ar0820@3", "tl16@3")
+    assert np.abs(fit.lights.photons - shipped.lights.photons).max() > 0
+    parameters = surrogate_fit(3)
+    np.testing.assert_allclose(fit.lights.photons, tl16(fit.grid, parameters).photons)
+    (space,) = (one for one in fit.spaces if one.name == "paper_N4")
+    assert (
+        dict(zip(space.parameters, space.points(0, 1)[0], strict=True))["left_nm"]
+        == parameters.stopbands["paper_N4"].left_nm
+    )
 
 
 def test_ranking_leaves_ties_out() -> None:
