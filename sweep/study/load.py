@@ -16,7 +16,7 @@ from .document import Document
 from .model import Study
 from .resolve import resolve
 from .schema import StudySection
-from .sensor_studies import SensorAndLights, SensorStudies, choose, members_of, narrowed, way_to_one
+from .sensor_studies import SensorAndLights, SensorStudies, choose, members_of, narrowed, of_one_fit, way_to_one
 from .sources import KeptSources, Sources
 
 
@@ -92,7 +92,7 @@ def study_of_keys(
 def _checked(document: Document) -> StudySection:
     """Return the study as its schema has it. Raises StudyError with the issues of the schema."""
     try:
-        return StudySection.model_validate(document.data)
+        return of_one_fit(StudySection.model_validate(document.data))
     except ValidationError as error:
         raise StudyError(document.issues(error, StudySection)) from None
 
