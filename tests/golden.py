@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,7 @@ import pandas as pd
 
 from sweep.results.tables import NAMED, REFERENCE
 from sweep.runs.rows import Rows, rows_of, rules_of
-from sweep.study import load_study, sensor_studies_in
+from sweep.study import Study, load_study, sensor_studies_in
 
 ROOT = Path(__file__).parent.parent
 FILE = ROOT / "tests" / "data" / "golden.parquet"
@@ -32,16 +34,23 @@ def golden_rows(name: str) -> pd.DataFrame:
     path, parts = ROOT / "studies" / f"{name}.yaml", []
     several = sensor_studies_in(path, {})
     for member in (None,) if several is None else several.members[:_MOST_MEMBERS]:
-        study = load_study(path, member=member).with_plans()
-        rules, scenario = rules_of(study), next(iter(study.scenarios))
-        for space in study.spaces:
-            if space.kind in (REFERENCE, NAMED):
-                one = np.zeros(1, dtype=np.intp)
-                rows = rows_of(Rows(space, scenario, one, one, one), study.setup(space, scenario), rules, rules.wanted)
-                numbers = rows.drop([n for n in (*_TEXTS, *_NUMBERS) if n in rows.column_names]).to_pandas().iloc[0]
-                known = numbers.dropna().astype(float).rename_axis("column").rename("value").reset_index()
-                parts.append(known.assign(study=study.name, scenario=scenario, name=f"{space.kind} {space.name}"))
-    return pd.concat(parts, ignore_index=True)[[*_KEYS, "value"]].assign(file=name)
+        study = load_study(path, member=member)
+        parts.append(numbers_of(study, [next(iter(study.scenarios))]))
+    return pd.concat(parts, ignore_index=True).assign(file=name)
+
+
+def numbers_of(study: Study, scenarios: Iterable[str] = ()) -> pd.DataFrame:
+    """Every number of every named design and plain CFA of a study, a row each; in all scenarios where none is named."""
+    planned, parts = study.with_plans(), []
+    rules = rules_of(planned)
+    for scenario, space in product(tuple(scenarios) or study.scenarios, study.spaces):
+        if space.kind in (REFERENCE, NAMED):
+            one = np.zeros(1, dtype=np.intp)
+            rows = rows_of(Rows(space, scenario, one, one, one), planned.setup(space, scenario), rules, rules.wanted)
+            numbers = rows.drop([n for n in (*_TEXTS, *_NUMBERS) if n in rows.column_names]).to_pandas().iloc[0]
+            known = numbers.dropna().astype(float).rename_axis("column").rename("value").reset_index()
+            parts.append(known.assign(study=study.name, scenario=scenario, name=f"{space.kind} {space.name}"))
+    return pd.concat(parts, ignore_index=True)[[*_KEYS, "value"]]
 
 
 def changes(kept: pd.DataFrame, found: pd.DataFrame, share: float = 1e-6) -> pd.DataFrame:

@@ -17,7 +17,12 @@ from typing import NamedTuple
 ROOT = Path(__file__).parent.parent
 GOLDEN, EFFECTS, PLAN = "contracts/test_golden.py", "camera/test_effects.py", "camera/test_plan.py"
 CAPTURES, LIMIT, SEARCH = "camera/test_captures.py", "search/test_limit.py", "search/test_search.py"
-SMOOTH, DAMAGE, RUNNER, TERMS = "search/test_smooth.py", "results/test_damage.py", "run/test_runner.py", "contracts/test_terms.py"
+SMOOTH, DAMAGE, RUNNER, TERMS = (
+    "search/test_smooth.py",
+    "results/test_damage.py",
+    "run/test_runner.py",
+    "contracts/test_terms.py",
+)
 
 
 class Mutant(NamedTuple):
@@ -32,34 +37,107 @@ class Mutant(NamedTuple):
 MUTANTS = (
     Mutant("camera/irradiance", "unscattered = 1 - share", "unscattered = 1 + share", PLAN),
     Mutant("camera/irradiance", "scene.off_axis_deg)) ** 4", "scene.off_axis_deg)) ** 3", EFFECTS),
-    Mutant("camera/irradiance", "(wavelength_nm / _REFERENCE_NM) ** -exponent", "(wavelength_nm / _REFERENCE_NM) ** exponent", EFFECTS),
-    Mutant("camera/irradiance", "luminance / per_photon_radiance * factor)[:, None]", "luminance * per_photon_radiance * factor)[:, None]"),
+    Mutant(
+        "camera/irradiance",
+        "(wavelength_nm / _REFERENCE_NM) ** -exponent",
+        "(wavelength_nm / _REFERENCE_NM) ** exponent",
+        EFFECTS,
+    ),
+    Mutant(
+        "camera/irradiance",
+        "luminance / per_photon_radiance * factor)[:, None]",
+        "luminance * per_photon_radiance * factor)[:, None]",
+    ),
     Mutant("camera/pixel", "cone = 1 + 4 * optics.f_number**2", "cone = 1 + 2 * optics.f_number**2"),
-    Mutant("camera/pixel", "(self.full_scale_dn - self.offset_dn) / self.dn_per_e)", "(self.full_scale_dn + self.offset_dn) / self.dn_per_e)", EFFECTS),
+    Mutant(
+        "camera/pixel",
+        "(self.full_scale_dn - self.offset_dn) / self.dn_per_e)",
+        "(self.full_scale_dn + self.offset_dn) / self.dn_per_e)",
+        EFFECTS,
+    ),
     Mutant("camera/pixel", "int(2**self.bits - 1)", "int(2**self.bits)"),
-    Mutant("camera/pixel", "electrons * pixel.dn_per_e + pixel.offset_dn)", "electrons * pixel.dn_per_e - pixel.offset_dn)", "camera/test_isetcam.py"),
+    Mutant(
+        "camera/pixel",
+        "electrons * pixel.dn_per_e + pixel.offset_dn)",
+        "electrons * pixel.dn_per_e - pixel.offset_dn)",
+        "camera/test_isetcam.py",
+    ),
     Mutant("camera/pixel", "(self.pitch_um * 1e-6) ** 2 * self.fill_factor", "(self.pitch_um * 1e-6) ** 2"),
     Mutant("camera/exposure", "full_e = exposure.level * setup", "full_e = setup"),
     Mutant("camera/exposure", "radiance / (ratio * grid.span_nm)", "radiance / (ratio * grid.size)"),
     Mutant("camera/pwm", "on_time(drive, start)) / (length * drive.duty)", "on_time(drive, start)) / length", EFFECTS),
     Mutant("camera/pwm", "np.maximum(0, rest - (1 - drive.duty))", "np.maximum(0, rest - drive.duty)", EFFECTS),
     Mutant("camera/sampling", "(share / 4, down, right)", "(share / 8, down, right)", EFFECTS),
-    Mutant("camera/sampling", "radius = target.object_resolution_px / 2", "radius = target.object_resolution_px", EFFECTS),
+    Mutant(
+        "camera/sampling", "radius = target.object_resolution_px / 2", "radius = target.object_resolution_px", EFFECTS
+    ),
     Mutant("camera/sampling", "1 - np.abs(dx) / columns", "1 - np.abs(dx) / rows", EFFECTS),
-    Mutant("camera/sampling", "rows % tile.shape[0], columns % tile.shape[1]", "rows % tile.shape[1], columns % tile.shape[0]", "hard/test_hard_cases.py"),
-    Mutant("camera/psf", "/ (8 * scenario.optics.f_number**2)", "/ (4 * scenario.optics.f_number**2)", "hard/test_hard_cases.py"),
-    Mutant("camera/readout", "held = np.minimum(electrons, pixel.saturation_e) if clips else electrons", "held = electrons", "hard/test_hard_cases.py"),
-    Mutant("camera/electrons", "dark = self._fixed_uniform + self.position", "dark = self._fixed_uniform - self.position", "camera/test_isetcam.py"),
-    Mutant("camera/electrons", "rates += uniform[:, :, None, :]", "rates -= uniform[:, :, None, :]", "camera/test_isetcam.py"),
-    Mutant("camera/angular", "1 / np.sqrt(1 - sine_squared / index**2)", "np.sqrt(1 - sine_squared / index**2)", "camera/test_angle.py"),
-    Mutant("camera/angular", "math.asin(min(1.0, 0.5 / f_number))", "math.asin(min(1.0, 1.0 / f_number))", "camera/test_angle.py"),
+    Mutant(
+        "camera/sampling",
+        "rows % tile.shape[0], columns % tile.shape[1]",
+        "rows % tile.shape[1], columns % tile.shape[0]",
+        "hard/test_hard_cases.py",
+    ),
+    Mutant(
+        "camera/psf",
+        "/ (8 * scenario.optics.f_number**2)",
+        "/ (4 * scenario.optics.f_number**2)",
+        "hard/test_hard_cases.py",
+    ),
+    Mutant(
+        "camera/readout",
+        "held = np.minimum(electrons, pixel.saturation_e) if clips else electrons",
+        "held = electrons",
+        "hard/test_hard_cases.py",
+    ),
+    Mutant(
+        "camera/electrons",
+        "dark = self._fixed_uniform + self.position",
+        "dark = self._fixed_uniform - self.position",
+        "camera/test_isetcam.py",
+    ),
+    Mutant(
+        "camera/electrons",
+        "rates += uniform[:, :, None, :]",
+        "rates -= uniform[:, :, None, :]",
+        "camera/test_isetcam.py",
+    ),
+    Mutant(
+        "camera/angular",
+        "1 / np.sqrt(1 - sine_squared / index**2)",
+        "np.sqrt(1 - sine_squared / index**2)",
+        "camera/test_angle.py",
+    ),
+    Mutant(
+        "camera/angular",
+        "math.asin(min(1.0, 0.5 / f_number))",
+        "math.asin(min(1.0, 1.0 / f_number))",
+        "camera/test_angle.py",
+    ),
     Mutant("camera/plan", "budget_dn, computed = tolerance_dn / 2", "budget_dn, computed = tolerance_dn * 2", PLAN),
     Mutant("camera/effects", "lost = box.signals * (1 - kept)", "lost = box.signals * (1 - kept) / 50", PLAN),
-    Mutant("camera/effects", "change = (matrix.T @ light.T).T - light", "change = ((matrix.T @ light.T).T - light) / 50", PLAN),
+    Mutant(
+        "camera/effects",
+        "change = (matrix.T @ light.T).T - light",
+        "change = ((matrix.T @ light.T).T - light) / 50",
+        PLAN,
+    ),
     Mutant("spectra/spectrum", "bins[[0, -1]] /= 2", "bins[[0, -1]] /= 1"),
-    Mutant("spectra/color", "photons) * grid.bins_nm\n    return np.asarray(energy @ color_matching(grid).T", "photons) * grid.bins_nm\n    return np.asarray(energy @ color_matching(grid)[::-1].T"),
-    Mutant("metrics/separation", "np.sqrt(4 * mosaic.counts / mosaic.counts.sum())", "np.sqrt(2 * mosaic.counts / mosaic.counts.sum())"),
-    Mutant("metrics/separation", "weighted = np.moveaxis(total_qe * counts, -1, 0)", "weighted = np.moveaxis(total_qe, -1, 0)"),
+    Mutant(
+        "spectra/color",
+        "photons) * grid.bins_nm\n    return np.asarray(energy @ color_matching(grid).T",
+        "photons) * grid.bins_nm\n    return np.asarray(energy @ color_matching(grid)[::-1].T",
+    ),
+    Mutant(
+        "metrics/separation",
+        "np.sqrt(4 * mosaic.counts / mosaic.counts.sum())",
+        "np.sqrt(2 * mosaic.counts / mosaic.counts.sum())",
+    ),
+    Mutant(
+        "metrics/separation",
+        "weighted = np.moveaxis(total_qe * counts, -1, 0)",
+        "weighted = np.moveaxis(total_qe, -1, 0)",
+    ),
     Mutant("metrics/separation", "start=weighted[0]) / counts.sum()", "start=weighted[0]) / counts.size"),
     Mutant("metrics/objective", "weight * columns[name]", "columns[name] / weight", TERMS),
     Mutant("metrics/bound", "self.min - values", "values - self.min", SEARCH),
@@ -68,16 +146,46 @@ MUTANTS = (
     Mutant("metrics/pareto", "maximise=True", "maximise=False", "report"),
     Mutant("metrics/smooth", "per = np.divide(0.5, values", "per = np.divide(1.0, values", SMOOTH),
     Mutant("metrics/smooth", "2 * self.values[:, None] * self.by_u", "self.values[:, None] * self.by_u", SMOOTH),
-    Mutant("search/filter_program", "self.low, self.high = self.base * least, highest(problem)", "self.low, self.high = self.base * least, self.base", LIMIT),
+    Mutant(
+        "search/filter_program",
+        "self.low, self.high = self.base * least, highest(problem)",
+        "self.low, self.high = self.base * least, self.base",
+        LIMIT,
+    ),
     Mutant("search/filter_program", "self.high * (1 + ROUNDING)", "self.high * 0.99", LIMIT),
-    Mutant("search/upper_bound", "Bound.model_construct(min=max(least, default=None)", "Bound.model_construct(min=min(least, default=None)", "search/test_produced_limit.py"),
-    Mutant("search/upper_bound", "return 1 - min(value, proven) / proven", "return 1 - proven / min(value, proven)", "cli/test_evaluate.py"),
-    Mutant("search/perturbed", "self.scale * curve[self.source] + self.constant", "curve[self.source] + self.constant", "search/test_produced_limit.py"),
+    Mutant(
+        "search/upper_bound",
+        "Bound.model_construct(min=max(least, default=None)",
+        "Bound.model_construct(min=min(least, default=None)",
+        "search/test_produced_limit.py",
+    ),
+    Mutant(
+        "search/upper_bound",
+        "return 1 - min(value, proven) / proven",
+        "return 1 - proven / min(value, proven)",
+        "cli/test_evaluate.py",
+    ),
+    Mutant(
+        "search/perturbed",
+        "self.scale * curve[self.source] + self.constant",
+        "curve[self.source] + self.constant",
+        "search/test_produced_limit.py",
+    ),
     Mutant("search/sides", "reach = min(part.cap, program.top)", "reach = max(part.cap, program.top)", LIMIT),
     Mutant("search/trade_off", "check_bound(best.objective, limit.proven, where)", "pass", SEARCH),
     Mutant("search/problem", "key=lambda e: e.objective", "key=lambda e: -e.objective", SEARCH),
-    Mutant("runs/as_read", "objective = np.minimum(objective,", "objective = np.maximum(objective,", "search/test_as_read.py"),
-    Mutant("runs/as_read", "bound.violation(columns[name]) * bound.scale", "bound.violation(columns[name])", "search/test_as_read.py"),
+    Mutant(
+        "runs/as_read",
+        "objective = np.minimum(objective,",
+        "objective = np.maximum(objective,",
+        "search/test_as_read.py",
+    ),
+    Mutant(
+        "runs/as_read",
+        "bound.violation(columns[name]) * bound.scale",
+        "bound.violation(columns[name])",
+        "search/test_as_read.py",
+    ),
     Mutant("runs/rows", "[fingerprint, *plans, jobs]", "[fingerprint, jobs]", "run"),
     Mutant("runs/rows", "[job.scenario, job.space, job.start, job.stop]", "[job.scenario, job.space]", "run"),
     Mutant("runs/kept", "answer {self._round}, {at}", "answer {at}", "run"),
@@ -101,7 +209,7 @@ class Planted(MetaPathFinder):
         self._mutant = mutant
         self._name = f"sweep.{mutant.module.replace('/', '.')}"
 
-    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:  # type: ignore[override]
+    def find_spec(self, name: str, path: object = None, _: object = None) -> ModuleSpec | None:  # type: ignore[override]
         """Find the module as Python does, with another loader."""
         if name != self._name:
             return None
@@ -117,7 +225,7 @@ class _Replaced(SourceFileLoader):
         super().__init__(name, path)
         self._mutant = mutant
 
-    def get_code(self, fullname: str) -> object:  # type: ignore[override]
+    def get_code(self, _: str) -> object:  # type: ignore[override]
         text = Path(self.path).read_text(encoding="utf-8")
         return compile(text.replace(self._mutant.text, self._mutant.becomes), self.path, "exec")
 
@@ -141,7 +249,7 @@ def killer_of(mutant: Mutant) -> str:
 
 
 def _test(mutant: Mutant, write: int) -> None:
-    import pytest  # noqa: PLC0415
+    import pytest
 
     failed: list[str] = []
 
@@ -178,7 +286,9 @@ def main(wanted: list[str]) -> int:
         began = time.monotonic()
         killer = killer_of(mutant)
         alive += not killer
-        print(f"{killer or 'LIVES':70} {mutant.module}: {mutant.becomes} ({time.monotonic() - began:.0f} s)", flush=True)
+        print(
+            f"{killer or 'LIVES':70} {mutant.module}: {mutant.becomes} ({time.monotonic() - began:.0f} s)", flush=True
+        )
     print(f"{len(MUTANTS) - alive} of {len(MUTANTS)} mutants are killed.")
     return alive
 

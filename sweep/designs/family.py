@@ -171,13 +171,14 @@ class Family(ABC):
     def _differences(
         self, x: PerParameter, function: Callable[[Float[Array, "_points parameters"]], Float[Array, "_points ..."]]
     ) -> Float[Array, "parameters ..."]:
-        """Return central differences, one-sided at the ends of a parameter."""
+        """Return central differences, one-sided at the ends of a parameter; 0 for one with a single value."""
         low, high = (np.array([getattr(p, end) for p in self.parameters], dtype=float) for end in ("low", "high"))
         step = np.diag(_STEP * (high - low))
         above, below = np.minimum(x + step, high), np.maximum(x - step, low)
         values = function(np.concatenate([above, below]))
         span = (above - below).diagonal().reshape(-1, *[1] * (values.ndim - 1))
-        return np.asarray((values[: x.size] - values[x.size :]) / span, dtype=float)
+        difference = values[: x.size] - values[x.size :]
+        return np.asarray(np.divide(difference, span, out=np.zeros_like(difference), where=span > 0), dtype=float)
 
 
 @runtime_checkable

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sweep.results.identity import fingerprint
 from sweep.study import folder_name, load_study
 
 from ..build import BASE, issues, load, one_line
@@ -122,13 +121,6 @@ def test_a_light_between_nodes_is_refused_with_the_way_out(tmp_path: Path) -> No
     (said,) = issues(tmp_path, text)
     assert "no photons on the wavelength grid, but between its nodes, 5 nm apart" in said
     assert "allowed: a finer `wavelengths: {step_nm: ...}`, or `resampling: mean`" in said
-
-
-def test_fingerprint_changes_with_every_input_of_a_row(tmp_path: Path) -> None:
-    first = fingerprint(load(tmp_path, BASE))
-    assert fingerprint(load(tmp_path, BASE + "question: else\n")) == first
-    assert fingerprint(load(tmp_path, BASE.replace("min: 0.9", "min: 0.8"))) != first
-    assert fingerprint(load(tmp_path, BASE + "pixel: {bits: 10}\n")) != first
 
 
 def test_folder_names_stay_inside_the_output() -> None:
