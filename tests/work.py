@@ -1,0 +1,86 @@
+"""Counted work of one design in the scenes of `studies/accuracy.yaml`: `python -m tests.work` keeps it.
+
+Counts do not depend on the machine, unlike seconds: functions of the package that are entered, values that the camera
+reads out, and evaluations of the search of `stopband`.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sweep.camera.model import SceneModel
+from sweep.camera.readout import Readout
+from sweep.metrics.evaluate import evaluate
+from sweep.search.problem import starting_points
+from sweep.search.solver import search_from
+from sweep.study import load_study
+
+ROOT = Path(__file__).parent.parent
+FILE = ROOT / "tests" / "data" / "work.json"
+PACKAGE = str(ROOT / "sweep")
+Work = dict[str, dict[str, int]]
+
+
+class Counter:
+    """Counts while it is entered."""
+
+    def __init__(self) -> None:
+        self.calls = self.values = 0
+        self._patch = pytest.MonkeyPatch()
+
+    def __enter__(self) -> Counter:
+        """Begin to count."""
+        transfer = Readout.transfer
+
+        def counted(readout: Readout, electrons: Any) -> Any:
+            result = transfer(readout, electrons)
+            self.values += int(np.size(result))
+            return result
+
+        self._patch.setattr(Readout, "transfer", counted)
+        sys.setprofile(self._entered)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop."""
+        sys.setprofile(None)
+        self._patch.undo()
+
+    def _entered(self, frame: FrameType, event: str, _: object) -> None:
+        self.calls += event == "call" and frame.f_code.co_filename.startswith(PACKAGE)
+
+
+def work_of(name: str) -> dict[str, int]:
+    """The work of one stopband, all columns, in a scene; once before, so that nothing is loaded or compiled."""
+    study = load_study(ROOT / "studies" / "accuracy.yaml")
+    space = study.spaces[-1]
+    curves = space.curves(space.points(0, 1), study.grid.size)
+    setup = study.setup(space, name)
+    evaluate(SceneModel(setup), curves)
+    with Counter() as counter:
+        evaluate(SceneModel(setup), curves)
+    return {"calls": counter.calls, "values": counter.values}
+
+
+def search_work() -> dict[str, int]:
+    """Evaluations of four starts of the search of `stopband`."""
+    study = load_study(ROOT / "studies" / "stopband.yaml").with_plans()
+    assert study.search is not None
+    problem = study.problem(study.search)
+    runs = [search_from(problem, at, u, "SLSQP", 200, 1) for at, u in enumerate(starting_points(problem, 4, 1))]
+    return {"evaluations": sum(len(run.log) for run in runs)}
+
+
+SCENES = tuple(load_study(ROOT / "studies" / "accuracy.yaml").scenarios)
+
+if __name__ == "__main__":
+    counted: Work = {name: work_of(name) for name in SCENES} | {"search": search_work()}
+    FILE.write_text(json.dumps(counted, indent=1) + "\n")
+    print(FILE.read_text())
