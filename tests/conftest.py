@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Callable
+import resource
+import time
+from collections.abc import Callable, Generator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +44,11 @@ needs_measured = pytest.mark.skipif(
 )
 
 
+DEAR = frozenset((ROOT / "tests" / "dear.txt").read_text().splitlines())
+"""Tests that take more than two seconds of a processor: left to `make slow`."""
+MOST_CPU_S = 4.0
+"""Of a quick test, with what it is the first to import."""
+_LOOP_S = 0.06
 FEWER = {
     "stopband": {
         "starts: 16": "starts: 4",
@@ -81,8 +89,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--hard-cases", metavar="PATH", help="write a table of the hard cases that ran to PATH, as JSON")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of the part that a process tests first, the long ones come first: at the end none waits for a long one of another."""
+    """Leave dear tests to `make slow`. Of the part that a process tests first, the long ones come first.
+
+    So at the end none waits for a long one of another.
+    """
+    for item in items:
+        if item.nodeid in DEAR:
+            item.add_marker(pytest.mark.slow)
     processes = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     kinds = [[item for item in items if (item.get_closest_marker("long") is None) is short] for short in (False, True)]
     ends = [[len(kind) * at // processes for at in range(processes + 1)] for kind in kinds]
@@ -92,6 +107,32 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for kind, end in zip(kinds, ends, strict=True)
         for item in kind[end[at] : end[at + 1]]
     ]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
+    """Fail a test of `make test` that takes too much processor time, on a machine as fast as ours or slower."""
+    began = _cpu_s()
+    result = yield
+    used_s = _cpu_s() - began
+    if item.get_closest_marker("slow") is None and used_s > MOST_CPU_S * _slower():
+        pytest.fail(
+            f"{used_s:.1f} s of a processor, where a quick test takes at most {MOST_CPU_S:g}: see tests/dear.txt"
+        )
+    return result
+
+
+def _cpu_s() -> float:
+    """Processor time of this process and of its children that ended, s."""
+    return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+
+
+@cache
+def _slower() -> float:
+    """How many times as long a loop takes here, at least 1."""
+    began = time.process_time()
+    sum(number * number for number in range(1_000_000))
+    return max(1.0, (time.process_time() - began) / _LOOP_S)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

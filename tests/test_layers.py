@@ -13,6 +13,8 @@ import pytest
 
 from sweep.runs.provenance import _PACKAGES
 
+from .conftest import DEAR, ROOT
+
 PACKAGE = Path(__file__).parent.parent / "sweep"
 LEVELS = [
     "base",
@@ -143,3 +145,10 @@ def test_a_wheel_has_every_file_of_the_package() -> None:
     shipped = {path for pattern in named for path in (root / "sweep").glob(pattern)}
     files = [path for path in (root / "sweep").rglob("*") if path.is_file() and "__pycache__" not in path.parts]
     assert not [path for path in files if path not in shipped and path.suffix not in (".py", ".md")]
+
+
+def test_every_dear_test_exists() -> None:
+    for line in sorted(DEAR):
+        file, _, name = line.partition("::")
+        function = name.partition("[")[0].rpartition("::")[2]
+        assert f"def {function}(" in (ROOT / file).read_text(encoding="utf-8"), line
