@@ -1,4 +1,4 @@
-"""Checks of the types of arguments and results, arrays with their shapes, at every call of the package."""
+"""Checks of the types of arguments and results, arrays with their shapes, of calls of the package."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def check_types(modules: set[str]) -> None:
 
 
 def checked(made: Any) -> Any:
-    """Return a function or dataclass that checks its types at each call; what only mypy can check is left to it."""
+    """Return a function or dataclass that checks its types; what only mypy can check is left to it."""
     if isinstance(made, type):
         if is_dataclass(made) and "__init__" in vars(made):
             made.__init__ = checked(made.__init__)  # type: ignore[misc]
@@ -48,14 +48,23 @@ def checked(made: Any) -> Any:
     if not any(map(_has_array, _MADE[key][0].__annotations__.values())):
         return found  # jaxtyping takes ten times as long as the check, and would have no shapes to compare
 
+    calls = _CALLS.setdefault(key, [0])
+
     @wraps(made)
     def of_one_call(*arguments: Any, **named: Any) -> Any:
+        calls[0] += 1
+        if calls[0] > _ALL_OF and calls[0] % _ALL_OF:
+            return made(*arguments, **named)
         with jaxtyped("context"):
             return found(*arguments, **named)
 
     return of_one_call
 
 
+_CALLS: dict[Any, list[int]] = {}
+"""How often each function with arrays was called."""
+_ALL_OF = 20
+"""Calls of a function with arrays that are all checked; then every 20th is, since a check takes longer than most calls."""
 _MADE: dict[Any, tuple[Function, Function]] = {}
 """Functions that check, and what they call, by where these stand; one inside of another is made again and again."""
 

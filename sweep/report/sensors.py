@@ -325,13 +325,14 @@ def picture_of(figures: pd.DataFrame, words: str) -> Picture:
         return _of_many(figures, words)
     figures = figures[figures["name"] != figures["reference"]]
     reference = figures["reference"].iloc[0] if len(figures) else RGGB
-    panels = []
+    panels, one_set = [], figures["lights"].nunique() == 1
     for of, title in (("ratio", words), ("light_ratio", "light of the whole CFA")):
         ratios = []
         for row in figures.to_dict("records"):
             low, high = (float(row.get(f"{of}_{end}", np.nan)) for end in (5, 95))
             ends = (low, high) if np.isfinite([low, high]).all() else (None, None)
-            ratios.append(Ratio(f"{row['sensor']}, {row['lights']}", str(row["design"]), float(row[of]), *ends))
+            where = row["sensor"] if one_set else f"{row['sensor']}, {row['lights']}"
+            ratios.append(Ratio(where, str(row["design"]), float(row[of]), *ends))
         panels.append(Ratios(f"{title} / that of {reference}", "times", tuple(ratios)))
     caption = f"Right of the line: more than {reference}."
     caption += " Bars: 5 to 95 % of random sensors." if "ratio_5" in figures else ""
