@@ -73,7 +73,7 @@ def test_no_fault_follows_from_another(tmp_path: Path, old: str, new: str, expec
             "search:\n",
             "serach:\n",
             "tiny.yaml:20: serach: unknown key; allowed: study, title, question, seed, wavelengths, sensor, sensors, camera, pixel, pixels, lights, "
-            "scenarios, columns, tolerance_dn, accuracy, geometry, cfas, colorants, designs, sweeps, boxes, production, population, uncertainty, regions, recognition, tasks, vision, metrics, effects, objective, constraints, search, validate, published; did you mean 'search'?",
+            "scenarios, columns, tolerance_dn, accuracy, geometry, cfas, colorants, designs, sweeps, boxes, production, population, uncertainty, regions, recognition, tasks, vision, metrics, effects, objective, constraints, search, validate, published, clouds; did you mean 'search'?",
         ),
         (
             "min: 590, max: 610",
@@ -100,7 +100,7 @@ def test_no_fault_follows_from_another(tmp_path: Path, old: str, new: str, expec
         (
             "sensor: ar0820",
             "sensor: ar0280",
-            "tiny.yaml:2: sensor: unknown built-in sensor (got 'ar0280'); allowed: ar0820, opencam, ar0132at, mt9v024, rawtoaces/NAME, or a mapping with `files`; "
+            "tiny.yaml:2: sensor: unknown built-in sensor (got 'ar0280'); allowed: ar0820, ar0820@NUMBER, opencam, ar0132at, mt9v024, rawtoaces/NAME, or a mapping with `files`; "
             "did you mean 'ar0820'?",
         ),
         (
