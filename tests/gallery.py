@@ -78,7 +78,8 @@ def answer_of(said: str) -> str:
     """The answer that a run prints: what stands before the effects that were left out."""
     lines = said.splitlines()
     ends = ("Left out: ", "Others: ", "RGGB over ", "More of both: ", "Of the best ", "Note: ", "Files: ")
-    return " ".join(lines[: next((at for at, line in enumerate(lines) if line.startswith(ends)), 1)])
+    answer = " ".join(lines[: next((at for at, line in enumerate(lines) if line.startswith(ends)), 1)])
+    return re.sub(r" [A-Z][^A-Z]* \.\.\. \(more in the report\)$", "", answer)  # a sentence that is cut
 
 
 def with_answer(text: str, study: str, answer: str) -> str:
