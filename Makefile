@@ -1,6 +1,6 @@
 # make study NAME=stopband   run studies/stopband.yaml, results in outputs/stopband
 # make report NAME=stopband  draw the report of outputs/stopband again
-# make test                  install and run the tests, which take about three minutes on two idle cores
+# make test                  install and run the tests, which take about five minutes on two cores
 # make slow                  run the tests that take longer, and the other cases of these
 # make oldest                run the tests with the oldest versions that pyproject.toml allows, in .venv-oldest
 # make check                 ruff, mypy --strict
@@ -26,7 +26,7 @@ unexport PYTHONDONTWRITEBYTECODE
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist worksteal
 KERNELS := sweep/base/machine_code.py $(shell grep -rl --include=*.py "machine_code import" sweep)
 
-.PHONY: study report test slow oldest accuracy check tables gallery docs bench clean
+.PHONY: study report test slow oldest mutants accuracy check tables gallery docs bench clean
 .DELETE_ON_ERROR:
 
 study: $(VENV)/.ready$(EXTRA)
@@ -43,6 +43,9 @@ slow: $(VENV)/.compiled
 
 oldest: $(OLDEST)/.oldest
 	@UNCHECKED_TYPES=1 $(MAKE) --no-print-directory test VENV=$(OLDEST)
+
+mutants: $(VENV)/.compiled
+	@$(ONE_THREAD) $(BIN)/python -m tests.mutants $(ARGS)
 
 accuracy: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest tests/hard/test_hard_cases.py -m "slow or not slow" --hard-cases outputs/accuracy/hard_cases.json
