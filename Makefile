@@ -3,6 +3,7 @@
 # make test                  install and run the tests, which take about five minutes on two cores
 # make slow                  run the tests that take longer, and the other cases of these
 # make oldest                run the tests with the oldest versions that pyproject.toml allows, in .venv-oldest
+# make mutants               plant faults of meaning, one at a time, and say which test sees each
 # make check                 ruff, mypy --strict
 # make accuracy              run the hard cases, measure what accuracy costs in time, and print the tables of
 #                            tests/README.md anew
