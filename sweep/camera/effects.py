@@ -88,10 +88,7 @@ class Box:
     @cached_property
     def brightest_signal_dn(self) -> float:
         """Largest unclipped response of any channel to a signal whose image is whole, without pedestal, DN."""
-        camera = self.setup.camera
-        dn = self._exposures_s[1] * self.light_range[1] * camera.pixel.dn_per_e
-        signals = self.signals * camera.area_bins_m2_nm
-        return float((signals @ self._highest.T).max() * dn)
+        return self.most_dn(self.signals)
 
     @cached_property
     def brightest_pixel_dn(self) -> float:
@@ -166,7 +163,7 @@ def _dimmed_dn(box: Box, kept: Float[Array, " #wavelengths"], readout: frozenset
     """
     lost = box.signals * (1 - kept)
     if readout & READOUT:
-        return _read_dn(box, box.most_dn(lost) + abs(added_dn), readout)
+        return _read_dn(box, box.most_dn(lost) + added_dn, readout)
     gray = float(1 - kept.max())
     colored = (kept.max() - kept) * box.signals
     of_factor = gray * box.largest_csd_dn + box.most_dn(colored) * box._sqrt_channels
@@ -303,7 +300,10 @@ def _angle_bound_dn(box: Box, readout: frozenset[str]) -> float:
     setup = box.setup
     if setup.scene.target is not None or setup.scene.field is not None:
         return math.inf
-    light, matrices = box.signals * box._dn, AngularResponse(setup.with_all_effects).matrices
+    # A background moves all readings alike, which cancels in differences of a linear readout alone.
+    common = box.backgrounds if readout & READOUT else np.zeros((1, box.signals.shape[1]))
+    light = (box.signals[:, None] + common).reshape(-1, box.signals.shape[1]) * box._dn
+    matrices = AngularResponse(setup.with_all_effects).matrices
     moved = [0.0]
     for channel, matrix in matrices.items():
         change = (matrix.T @ light.T).T - light

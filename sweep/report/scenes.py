@@ -12,6 +12,7 @@ from ..camera.plan import Choice, Plan
 from ..results.facts import EffectFacts
 from ..study import Study
 from .pages import aligned
+from .words import inward
 
 _FASTER = 1.05
 """Less is noise of the measurement."""
@@ -43,7 +44,7 @@ def left_out_in_words(
     left_out = {one.effect for one in effects} - {one.effect for one in effects if one.computed}
     if not risk_dn:
         return f"Left out: {len(left_out)} effects that no scene has; 0 of {tolerance_dn:g} DN at risk."
-    text = f"Left out: {len(left_out)} effects, at most {risk_dn:.2g} of {tolerance_dn:g} DN"
+    text = f"Left out: {len(left_out)} effects, at most {inward(risk_dn, up=True, digits=2):.2g} of {tolerance_dn:g} DN"
     if seconds is None:
         return f"{text}."
     own_s, all_s = seconds
@@ -66,7 +67,7 @@ def plan_lines(study: Study, seconds: tuple[float, float] | None) -> Iterator[st
         several = f" ... {plans[-1].scenario} ({len(plans)} scenes)" if len(plans) > 1 else ""
         yield (
             f"{plans[0].scenario}{several}: what is left out changes a CSD by at most "
-            f"{left_out_dn:.2g} DN (tolerance {plans[0].tolerance_dn:g} DN)"
+            f"{inward(left_out_dn, up=True, digits=2):.2g} DN (tolerance {plans[0].tolerance_dn:g} DN)"
         )
         effects = zip(*(plan.choices for plan in plans), strict=True)
         largest = [max(choices, key=lambda choice: choice.bound_dn or 0.0) for choices in effects]

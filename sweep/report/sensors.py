@@ -199,7 +199,7 @@ def _summary(figures: pd.DataFrame, unit: str) -> pd.DataFrame:
             "with lights": len(of_design),
             "more": _verdict(of_design),
             "separation": _span(of_design["ratio"]),
-            "dn": f"{digits(of_design['dn'].min())} to {digits(of_design['dn'].max())} {unit}".rstrip(),
+            "dn": f"{' to '.join(dict.fromkeys(digits(end(of_design['dn'])) for end in (min, max)))} {unit}".rstrip(),
             "light": _span(of_design["light_ratio"]),
             "more of both": f"{int(more.sum())} of {len(of_design)}",
             **{words: _span(of_design[f"{key}_ratio"]) for key, words in _MORE.items() if f"{key}_ratio" in of_design},

@@ -100,7 +100,7 @@ class CheckFacts(_Facts):
 
 
 class SearchFacts(_Facts):
-    """A search in figures; see `search.upper_bound.UpperBound` for those of the limit.
+    """A search in figures; see `search.upper_bound.UpperBound` for those of the bound.
 
     `scenario`: of several (`scenarios`) the one in which the answer is worst. `cfa`, `channel`: the searched ones.
     `bounded`: kind and name of the spaces whose feasible filters the limit holds for, in that scenario.

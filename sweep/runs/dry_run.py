@@ -90,7 +90,7 @@ def remaining_work(study: Study, output: Path, n_workers: int = 1) -> RemainingW
 def seconds_of_effects(planned: Study) -> tuple[float, float] | None:
     """Measure what the effects that a bound leaves out save, on a sample of rows.
 
-    Returns the time of all rows on one core as planned, and with every effect, s; None if no bound leaves one out.
+    Returns the processor time of all rows as planned, and with every effect, s, whatever else runs; None if no bound leaves one out.
     """
     if not any(plan.error_bound_dn for plan in planned.plans.values()):
         return None
@@ -98,11 +98,11 @@ def seconds_of_effects(planned: Study) -> tuple[float, float] | None:
     studies, seconds, rows, order = (planned, replace(planned, plans={})), np.zeros(2), 0, spread(len(jobs))
     for sampled, at in enumerate((*order[:1], *order)):
         for index, study in enumerate(studies):
-            begun = time.perf_counter()
+            begun = time.process_time()
             with threadpool_limits(1):  # as in a worker
                 run_job(jobs[at], study, rules_of(study))
             if sampled:  # the first once before, to load code
-                seconds[index] += time.perf_counter() - begun
+                seconds[index] += time.process_time() - begun
         rows += jobs[at].size if sampled else 0
         if seconds.sum() > _SAMPLED_S:
             break
