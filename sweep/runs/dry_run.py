@@ -90,7 +90,7 @@ def remaining_work(study: Study, output: Path, n_workers: int = 1) -> RemainingW
 def seconds_of_effects(planned: Study) -> tuple[float, float] | None:
     """Measure what the effects that a bound leaves out save, on a sample of rows.
 
-    Returns the processor time of all rows as planned, and with every effect, s, whatever else runs; None if no bound leaves one out.
+    Returns the processor time of all rows as planned, and with every effect, s; None if no bound leaves one out.
     """
     if not any(plan.error_bound_dn for plan in planned.plans.values()):
         return None
