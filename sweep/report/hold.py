@@ -69,7 +69,7 @@ def curves_in_words(output: Output) -> str:
     facts, count = output.provenance, sum(map(len, output.curves.bundles.values()))
     relative = "" if response_of(output.curves.sensor) == QE else " (relative, taken as quantum efficiencies)"
     sensor = (
-        f"surrogate curves of {facts.sensor.name} (**modeled, not measured**; `surrogates` has further fits)"
+        f"surrogate curves of {facts.sensor.name} (**modeled, not measured**; further fits: study surrogates)"
         if facts.sensor.surrogate
         else f"curves of {facts.sensor.name}{relative}"
     )
