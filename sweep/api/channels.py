@@ -203,13 +203,12 @@ def sensor_file(paths: Path | Sequence[Path], quantity: Quantity | None = None) 
             "columns named by channels (R, G, B, W, C, Y, Cy, M) or colors, three or more; `sensor.files` of a study"
         )
         raise DataError(ValidationIssue(problem, str(shown), None, None, ", ".join(unknown) or None, allowed))
-    samples = [curves[column].wavelength_nm for column in channels.columns.values()]
-    low, high = max(float(wave[0]) for wave in samples), min(float(wave[-1]) for wave in samples)
-    if low > _NEEDED_NM[0] or high < _NEEDED_NM[1]:
-        allowed = f"{_NEEDED_NM[0]:g} to {_NEEDED_NM[1]:g} nm or more"
-        raise DataError(
-            ValidationIssue("QE of too few wavelengths", str(shown), None, None, f"{low:g} to {high:g} nm", allowed)
-        )
+    ends = {name: curves[name].wavelength_nm[[0, -1]].tolist() for name in channels.columns.values()}
+    low, high = max(first for first, _ in ends.values()), min(last for _, last in ends.values())
+    if short := [n for n, (first, last) in ends.items() if first > _NEEDED_NM[0] or last < _NEEDED_NM[1]]:
+        problem, value = "QE of too few wavelengths", f"{ends[short[0]][0]:g} to {ends[short[0]][1]:g} nm"
+        allowed = f"{_NEEDED_NM[0]:g} to {_NEEDED_NM[1]:g} nm or more; `outside: zero` of a study's file takes 0 beyond"
+        raise DataError(ValidationIssue(problem, str(shown), None, short[0], value, allowed))
     return SensorFile(
         name=shown.stem[:MOST_LETTERS],
         channels=channels,

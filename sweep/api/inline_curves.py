@@ -68,7 +68,7 @@ def to_curves(name: str, curve: CurveLike) -> Curves:
     if isinstance(curve, Path | str):
         return _curve_in_file(name, Path(curve))
     if isinstance(curve, tuple) and len(curve) == 2:
-        wavelength_nm, values = np.asarray(curve[0]), np.asarray(curve[1])
+        wavelength_nm, values = curve
     else:
         import pandas as pd  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
@@ -77,15 +77,20 @@ def to_curves(name: str, curve: CurveLike) -> Curves:
                 ValidationIssue("no curve over wavelength", key=name, value=type(curve).__name__, allowed=_FORMS)
             )
         wavelength_nm, values = curve.index.to_numpy(), curve.to_numpy()
-    try:
-        return Curves(*_checked(name, wavelength_nm, values), source=name)
-    except (TypeError, ValueError):
-        raise DataError(ValidationIssue("a curve's samples are numbers", key=name, allowed=_FORMS)) from None
+    return Curves(*_checked(name, wavelength_nm, values), source=name)
+
+
+def columns_of(table: pd.DataFrame) -> dict[str, pd.Series]:
+    """Return the columns of a table by their names as texts; raises DataError for one name twice."""
+    names = [str(name) for name in table.columns]
+    if twice := [name for at, name in enumerate(names) if name in names[:at]]:
+        raise DataError(ValidationIssue("column occurs twice", key=twice[0], allowed="names that differ as texts"))
+    return {name: table.iloc[:, at] for at, name in enumerate(names)}
 
 
 def table_to_curves(table: pd.DataFrame) -> Curves:
     """Return the columns of a table, indexed by nm, as `Curves`."""
-    columns = {str(name): to_curves(str(name), column) for name, column in table.items()}
+    columns = {name: to_curves(name, column) for name, column in columns_of(table).items()}
     if not columns:
         raise DataError(ValidationIssue("a table without curves", allowed="a column per curve, nm as the index"))
     nodes_nm = next(iter(columns.values())).wavelength_nm
@@ -97,7 +102,7 @@ def on_grid(
 ) -> Float[Array, "curves wavelengths"]:
     """Bring one or more curves to a study's wavelength grid."""
     if isinstance(curve, np.ndarray):
-        rows = np.atleast_2d(np.asarray(curve, dtype=float))
+        rows = np.atleast_2d(_numbers(name, curve))
         if rows.ndim != 2 or rows.shape[1] != grid.size:
             allowed = f"{grid.size} values, on the study's wavelengths, or rows of these; or {_FORMS}"
             raise DataError(
@@ -133,10 +138,22 @@ def filter_on_grid(
 
 def _checked(name: str, wavelength_nm: Any, values: Any) -> tuple[PerSample, Mapping[str, PerSample]]:
     try:
-        nodes_nm, samples = check_samples(np.asarray(wavelength_nm, dtype=float), np.asarray(values, dtype=float))
+        nodes_nm, samples = check_samples(_numbers(name, wavelength_nm), _numbers(name, values))
     except DataError as error:
         raise _named(error, name) from None
     return nodes_nm, {name: samples}
+
+
+def _numbers(name: str, values: Any) -> FloatArray:
+    """Return a copy of real numbers, so that what the user does with the array afterwards changes nothing."""
+    try:
+        array = np.array(values)
+        if array.dtype.kind not in "fiu" or np.ma.is_masked(values):
+            raise ValueError(array.dtype)
+        return array.astype(float)
+    except (TypeError, ValueError):
+        allowed = f"real numbers, none of them masked; {_FORMS}"
+        raise DataError(ValidationIssue("a curve's samples are numbers", key=name, allowed=allowed)) from None
 
 
 def _named(error: DataError, name: str) -> DataError:

@@ -19,7 +19,7 @@ from ..spectra.light_files import lights_file
 from ..spectra.spectrum import Curves
 from ..study.shipped import shipped_names, study_path
 from .channels import sensor_file
-from .inline_curves import CurveLike, table_to_curves, to_curves
+from .inline_curves import CurveLike, columns_of, table_to_curves, to_curves
 from .objects import FinishedRun, LoadedStudy
 
 if TYPE_CHECKING:
@@ -162,9 +162,11 @@ def make_study(
     curves: dict[str, Curves] = {}
     for source in (sensor, lights):
         curves |= source.curves if isinstance(source, CurveSource) else {}
-    plain = {key: _plain(value) for key, value in document.items()}
     try:
+        plain = {key: _plain(value) for key, value in document.items()}
         return LoadedStudy(studies_of_files.study_of_keys(plain, Path.cwd(), curves, allow_code=allow_code))
+    except RecursionError:
+        raise StudyError("a value of the study holds itself, or is nested too deep") from None
     except StudyError as error:
         raise StudyError([_as_given(issue, keys) for issue in error.issues]) from None
 
@@ -262,8 +264,7 @@ def sensor(
     if not _is_table(source):
         allowed = "a built-in sensor, a file, or a table with nm as its index"
         raise DataError(ValidationIssue("no sensor", value=type(source).__name__, allowed=allowed))
-    columns = {str(channel): column for channel, column in source.items()}
-    return sensor_source(None, columns | channels, relative_to=relative_to, name=name, clear=clear)
+    return sensor_source(None, columns_of(source) | channels, relative_to=relative_to, name=name, clear=clear)
 
 
 def sensor_source(
@@ -326,6 +327,9 @@ def lights(
     >>> sweep.make_study(lights=lights, cfas=["RGGB"]).evaluate().csd_yellow_red.round().tolist()
     [182.0]
     """
+    texts = [kind for kind, columns in (types or {}).items() if isinstance(columns, str)]
+    if texts:
+        raise DataError(ValidationIssue("columns of a type", key=f"types.{texts[0]}", allowed="a list of names"))
     signals = None if types is None else {kind: list(columns) for kind, columns in types.items()}
     if _is_table(source):
         if signals is None:
@@ -339,6 +343,9 @@ def lights(
         raise DataError(ValidationIssue("no lights", value=type(source).__name__, allowed=allowed))
     path = Path(source)
     if not os.path.lexists(path):
+        if types is not None or quantity is not None:
+            key = "quantity" if types is None else "types"
+            raise DataError(ValidationIssue("built-in lights have their own", key=key, allowed="a file or table"))
         return CurveSource({"builtin": str(source)})
     if signals is None:
         return CurveSource(lights_file(path, quantity).keys(lambda place: str(place.absolute())))

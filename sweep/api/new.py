@@ -120,12 +120,11 @@ def _new_path(name: str, folder: Path, *, force: bool) -> Path:
 
 
 def _path_in_study(file: Path, folder: Path) -> str:
-    """Path of a file as the study says it: relative where it lies beside or below the study, else absolute.
-
-    So the study can be moved: alone, or with the files beside it.
-    """
-    file, folder = file.resolve(), folder.resolve()
-    return (file.relative_to(folder) if file.is_relative_to(folder) else file).as_posix()
+    """Path of a file as the study says it: relative to the study, so that both can be moved together."""
+    try:
+        return Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix()
+    except ValueError:  # on another disk of Windows
+        return file.resolve().as_posix()
 
 
 def _source_lines(sources: Sources) -> list[str]:

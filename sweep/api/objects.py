@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from html import escape
@@ -218,6 +219,10 @@ class LoadedStudy:
         scene = next(iter(self.study.scenarios)) if scenario is None else known_scenario(self.study, scenario)
         problem = any_filter_search(self.study, self.study.setup(space, scene))
         if sensitivity is not None:
+            if isinstance(sensitivity, str) or not 0 <= sensitivity <= 1:
+                raise SweepError(
+                    ValidationIssue("no share of the light", key="sensitivity", value=sensitivity, allowed="0 to 1")
+                )
             problem = with_lower_bound(problem, "sensitivity", sensitivity)
         limit, reason = upper_bound_or_reason(problem)
         if limit is None:
@@ -252,6 +257,10 @@ class LoadedStudy:
             Its `evaluate` computes only the effects that the tolerance calls for; its `plans` state what is left out
             and why.
         """
+        if isinstance(tolerance_dn, str) or (tolerance_dn is not None and not 0 <= tolerance_dn < np.inf):
+            raise SweepError(
+                ValidationIssue("no tolerance", key="tolerance_dn", value=tolerance_dn, allowed="0 DN or more")
+            )
         return LoadedStudy(self.study.with_plans(tolerance_dn))
 
     @property
@@ -326,9 +335,12 @@ class FinishedRun:
 
     def __init__(self, folder: Path, data: Path | None = None, *, allow_code: bool = False) -> None:
         from ..report import read_output
+        from ..results.manifest import Manifest
 
         self.folder, self._data, self._allow_code = folder, data, allow_code
         self.output: Output = read_output(self.folder)
+        for line in Manifest(self.folder).notes:
+            warnings.warn(line, stacklevel=3)
 
     def __fspath__(self) -> str:
         return str(self.folder)

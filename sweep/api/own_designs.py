@@ -145,7 +145,7 @@ def _values(parameter: Parameter, stated: Any) -> tuple[float, ...]:
         raise SweepError(ValidationIssue("missing", key=parameter.name, allowed=allowed))
     try:
         values = np.asarray(stated, dtype=float).ravel()
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         issue = ValidationIssue("not a number, nor several", key=parameter.name, value=stated, allowed=allowed)
         raise SweepError(issue) from None
     outside = values[~((values >= parameter.low) & (values <= parameter.high))]

@@ -31,7 +31,7 @@ from ..results.folder import begin, run_folder
 from ..results.identity import run_facts, several_facts
 from ..results.lock import locked
 from ..results.manifest import Manifest
-from ..results.tables import ALL_SENSORS, PROVENANCE, REPORT, json_of
+from ..results.tables import ALL_SENSORS, MANIFEST, PROVENANCE, REPORT, RESULTS, json_of
 from ..runs.kept import CachedCalls
 from ..runs.runner import discard
 from ..runs.workers import backend_here, workers
@@ -64,6 +64,10 @@ class _How:
     progress: Progress = silent
     note: Callable[[str], object] = silent
     command: Sequence[str] = field(default_factory=lambda: sys.argv)
+
+    def __post_init__(self) -> None:
+        if self.jobs is not None and self.jobs < 1:
+            raise SweepError(ValidationIssue("no number of workers", key="jobs", value=self.jobs, allowed="1 or more"))
 
     def load(self, path: Path, member: SensorAndLights | None = None) -> Study:
         """Load a study, one of a sensor and light set where it has several."""
@@ -194,10 +198,14 @@ def _run_one(study: Study, how: _How, member: SensorAndLights | None = None) -> 
     if how.dry_run:
         left = runner.remaining_work(study, folder, n_workers)
         return Answer([*runner.remaining_work_lines(left, folder)], {"folder": str(folder), **left.facts})
+    if Manifest(folder).damaged:
+        how.note(f"{folder / MANIFEST} was damaged, and is written again.")
     with runner.stopped_by_signals(), workers(n_workers, backend, how.scheduler) as pool:
         computed = runner.run_study(
             study, folder, n_workers, how.progress, how.command, scheduler=how.scheduler, options=how.options, pool=pool
         )
+        for line in Manifest(folder).notes:
+            how.note(line)
         if not computed:
             how.note(f"{folder} holds this very study, finished; nothing was computed.")
         from ..runs.audit import audit_again  # noqa: PLC0415  (tables are loaded while workers compute)
@@ -268,7 +276,7 @@ def _join(
     runs = [SensorRun(member, Path(run_facts["folder"])) for member, run_facts in facts_of.items()]
     wrong = manifest.wrong([PROVENANCE, *manifest.files.keys() - {REPORT}])
     if wrong or any(run_facts["computed"] for run_facts in facts_of.values()):
-        manifest.remove([PROVENANCE, *manifest.rows()])
+        manifest.remove([PROVENANCE, *(name for name in manifest.files if name.startswith(f"{RESULTS}/"))])
         for at, table in enumerate(rows_of_all(runs)):
             manifest.write({part_name(at): encoded_part(table, "")})
         if {PROVENANCE, ALL_SENSORS} & wrong.keys():

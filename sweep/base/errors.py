@@ -114,6 +114,7 @@ def faults_of(path: Sequence[str | int], error: SweepError) -> list[Fault]:
 
 EXIT_CODES = {
     0: "done",
+    1: "files of a run are missing, damaged or not its own (`sweep status`)",
     2: "an error of the input, the machine or the command line: a line says which",
     3: "no design of the search can meet the constraints",
     4: "a design failed, with --fail-fast",
@@ -151,6 +152,12 @@ class DataError(SweepError):
 
 class OutputError(SweepError):
     """An output folder that cannot be written, read or is in use."""
+
+
+class DamagedRunError(OutputError):
+    """A run whose files are not as it wrote them."""
+
+    exit_code = 1
 
 
 class InfeasibleError(SweepError):

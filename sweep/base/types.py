@@ -11,7 +11,9 @@ from jaxtyping import Float as Float
 from jaxtyping import Int as Int
 from jaxtyping import Num as Num
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from .errors import StudyError, ValidationIssue
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -79,7 +81,22 @@ def in_turn(calls: Iterable[Call]) -> Iterator[Any]:
         yield function(*arguments, **named)
 
 
-class Section(BaseModel):
+class _Told(type(BaseModel)):  # type: ignore[misc]
+    """Class whose calls tell what is wrong as all of the package does."""
+
+    def __call__(self, *arguments: Any, **keys: Any) -> Any:
+        try:
+            return super().__call__(*arguments, **keys)
+        except ValidationError as error:
+            raise StudyError(
+                [
+                    ValidationIssue(item["msg"], key=".".join(map(str, item["loc"])), value=item["input"])
+                    for item in error.errors(include_url=False)
+                ]
+            ) from None
+
+
+class Section(BaseModel, metaclass=_Told):
     """Frozen section of a study; unknown keys, NaN, infinity and quoted numbers are refused.
 
     The docstring below a field is its description, which `study.editors` reads. Validators are built at the first use,

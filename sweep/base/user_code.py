@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import entry_points
@@ -12,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
 
-from .disk import read_input
+from .disk import is_file, read_input
 from .errors import SweepError, ValidationIssue
 
 Offered = Literal["sweep.families", "sweep.metrics", "sweep.effects", "sweep.sensors", "sweep.lights"]
@@ -142,6 +144,41 @@ def read_code(path: Path) -> tuple[str, str]:
         return content.decode("utf-8-sig"), hashlib.sha256(content).hexdigest()
     except UnicodeDecodeError:
         raise SweepError(ValidationIssue("not UTF-8 text", str(path))) from None
+
+
+def beside(place: Path, source: str) -> list[Path]:
+    """Return the files in the folder of some code that it depends on: what it imports, and what its `FILES` names.
+
+    Nothing runs: `FILES` is a plain list of names. Raises SweepError if one of those is missing.
+    """
+    found, texts = dict[Path, None](), [source]
+    while texts:
+        try:
+            nodes = [*ast.walk(ast.parse(texts.pop()))]
+        except (SyntaxError, ValueError, RecursionError):
+            continue  # which is said when it is to run
+        imported = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+        imported += [node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module]
+        for name in imported:
+            top = place.parent / name.partition(".")[0]
+            for path in [*filter(is_file, [top.with_suffix(".py")]), *sorted(top.rglob("*.py"))]:
+                if path not in found and path != place:
+                    found[path] = None
+                    texts.append(read_code(path)[0])
+        for name in _files_in(nodes):
+            if not is_file(place.parent / name):
+                raise SweepError(ValidationIssue("no such file, which FILES names", str(place), value=name))
+            found[place.parent / name] = None
+    return [*found]
+
+
+def _files_in(nodes: list[ast.AST]) -> list[str]:
+    """Return the names in `FILES = [...]` of a module."""
+    for node in nodes:
+        if isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] == ["FILES"]:
+            with suppress(ValueError):
+                return [str(name) for name in ast.literal_eval(node.value)]
+    return []
 
 
 @dataclass(frozen=True)

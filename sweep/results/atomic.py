@@ -10,7 +10,7 @@ from pathlib import Path
 from ..base.errors import OutputError, ValidationIssue
 
 LEFT_OVER = r"\.tmp-\d+-.*"
-"""Hidden names of files that are being written; readers of Parquet folders skip names that begin with a dot."""
+"""Names of files that are being written: hidden, and without the ending that readers of Parquet folders look for."""
 
 
 @contextmanager
@@ -21,7 +21,7 @@ def atomic(path: Path) -> Iterator[Path]:
 
     Raises OutputError if the disk refuses (full, read-only, no permission).
     """
-    hidden = path.with_name(f".tmp-{os.getpid()}-{path.name}")
+    hidden = path.with_name(f".tmp-{os.getpid()}-{path.name}~")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         hidden.unlink(missing_ok=True)

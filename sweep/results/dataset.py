@@ -10,6 +10,7 @@ import hashlib
 import os
 import re
 import stat
+from collections.abc import Container
 from pathlib import Path
 
 import pyarrow as pa
@@ -63,13 +64,26 @@ def refuse_others(folder: Path) -> None:
         raise OutputError(ValidationIssue("file not created by sweep; move it", str(folder / RESULTS)))
 
 
-def rows_in(folder: Path) -> tuple[int, int]:
-    """Return the number of rows and parts of a run, without those that cannot be read."""
+def rows_in(folder: Path, designs: float) -> tuple[int, int]:
+    """Return the number of rows of a run's `designs`, and of parts, without those that cannot be read."""
     rows, parts = 0, 0
     for path in part_paths(folder):
         try:
-            rows += pq.read_metadata(path).num_rows
-            parts += 1
+            with pq.ParquetFile(path) as file:
+                first = file.metadata.row_group(0).column(0).statistics.min
+                rows += file.metadata.num_rows if first < designs else 0  # else the answers of a search
+                parts += 1
         except (OSError, pa.ArrowException):
             continue
     return rows, parts
+
+
+def strange_entries(folder: Path, known: Container[str]) -> list[str]:
+    """Return what a reader of the dataset would take for rows, beside the `known` parts: copies, files of others."""
+    inner, found = folder / RESULTS, list[str]()
+    for path in sorted(inner.rglob("*")) if is_real_folder(inner) else ():
+        skipped = any(part.startswith((".", "_")) for part in path.relative_to(inner).parts)
+        name = path.relative_to(folder).as_posix()
+        if name not in known and not is_real_folder(path) and (path.suffix == ".parquet" or not skipped):
+            found.append(name)
+    return found

@@ -38,7 +38,7 @@ def output_folder(base: Path, facts: Mapping[str, Any]) -> tuple[Path, str | Non
         if held is None or held.is_of(facts):
             return folder, None if note is None else f"{note}; this one is in {folder}"
         if held.damaged:
-            held.require_run()
+            held.require_run()  # or it may be this one
         if held.fingerprint:
             note = f"{folder} holds another study of this name ({_changed(held, facts)})"
         else:
@@ -57,7 +57,7 @@ def begin(folder: Path, facts: Mapping[str, Any]) -> Manifest:
     if manifest.fingerprint and not manifest.is_of(facts):
         problem = f"holds another study ({_changed(manifest, facts)})"
         raise OutputError(ValidationIssue(problem, str(folder), allowed="another folder"))
-    if not manifest.fingerprint:
+    if manifest.damaged or not manifest.fingerprint:
         manifest.begin(facts)
     return manifest
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from filelock import BaseFileLock, FileLock, SoftFileLock, Timeout
 
-from ..base.disk import is_real_folder, read_plain
+from ..base.disk import is_real_folder, opened, read_plain
 from ..base.errors import OutputError, ValidationIssue
 from .answers import ANSWERS
 from .atomic import LEFT_OVER
@@ -85,8 +85,24 @@ def in_use(output: Path) -> bool:
         return False
     try:
         _acquired(output, 0).release()
-    except (Timeout, OSError):
+    except Timeout:
         return True
+    except OSError:  # a disk or an owner that lets nobody write: whoever holds it is asked otherwise
+        return _is_held(output / LOCK)
+    return False
+
+
+def _is_held(path: Path) -> bool:
+    """Return whether a process holds the lock of a file that may only be read."""
+    try:
+        import fcntl  # noqa: PLC0415  (not on Windows)
+
+        with opened(path) as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except (OSError, ImportError):
+        return False
     return False
 
 

@@ -19,7 +19,7 @@ from ..base.disk import digest_of, is_link, is_real_folder, read_facts
 from ..base.errors import OutputError, ValidationIssue
 from ..study import SensorAndLights
 from .atomic import write_bytes
-from .dataset import part_paths
+from .dataset import part_paths, strange_entries
 from .tables import (
     AUDIT,
     FIGURES,
@@ -53,9 +53,9 @@ class Manifest:
         self.facts = read_facts(folder / MANIFEST)
         digest = self.facts.pop(_DIGEST, None)
         self.damaged = os.path.lexists(folder / MANIFEST) and not (digest == _digest(self.facts) and self._is_whole())
-        self.files: dict[str, str] = {} if self.damaged else self.facts.pop(_FILES, {})
+        self.files: dict[str, str] = self.facts.pop(_FILES, {}) if not self.damaged else {}
         if self.damaged:
-            self.facts = {}
+            self._read_without()
 
     def _is_whole(self) -> bool:
         """Return whether the facts have the types that a run writes."""
@@ -65,6 +65,17 @@ class Manifest:
         return all(isinstance(text, str) for text in texts) and all(
             [type(name) for name in pair] == [str, str] for pair in pairs
         )
+
+    def _read_without(self) -> None:
+        """Take the facts of a finished run from its provenance, and its files as they are."""
+        known = read_facts(self.folder / PROVENANCE)
+        self.facts = {key: known[key] for key in ("fingerprint", "runs", "designs") if key in known}
+        if not self._is_whole():
+            self.facts = {}
+            return
+        for name in self._names_of_run():
+            with suppress(OSError):
+                self.files[name] = digest_of(self.path(name))
 
     @property
     def fingerprint(self) -> str:
@@ -77,7 +88,7 @@ class Manifest:
 
     def require_run(self) -> None:
         """Raise OutputError if nothing tells which run the folder is of."""
-        if self.damaged:
+        if self.damaged and not self.fingerprint:
             problem = "is damaged, so that nothing is known of the run; move its folder away"
             raise OutputError(ValidationIssue(problem, str(self.path(MANIFEST)), allowed="another --output"))
         if not self.fingerprint:
@@ -96,14 +107,22 @@ class Manifest:
         """True if all files are there, provenance among them."""
         return PROVENANCE in self.files and not self.wrong(filter(_by_run, self.files), quick=True)
 
-    def rows(self) -> list[str]:
-        """Return the parts in the folder, listed or not."""
-        return [f"{RESULTS}/{path.name}" for path in part_paths(self.folder)]
-
     @property
     def strange_rows(self) -> list[str]:
-        """Parts in the folder of a finished run that it did not write."""
-        return [name for name in self.rows() if name not in self.files] if PROVENANCE in self.files else []
+        """Entries that a reader takes for rows, and that the run did not write; a part of one that goes on may be."""
+        begun = [] if PROVENANCE in self.files else [f"{RESULTS}/{path.name}" for path in part_paths(self.folder)]
+        return strange_entries(self.folder, {*self.files, *begun})
+
+    @property
+    def notes(self) -> list[str]:
+        """What a reader of the folder has to know, a line each."""
+        lines = [
+            f"{self.path(name)} {_STRANGE}, and readers of the folder take it for rows: move it away"
+            for name in self.strange_rows
+        ]
+        if self.damaged:
+            lines.append(f"{self.path(MANIFEST)} {_DAMAGED}; `sweep run` of the study writes it again")
+        return lines
 
     def batches(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
         """Yield the rows of a run, a part at a time.
@@ -124,6 +143,8 @@ class Manifest:
         `names`: files that are looked at; left out, all; `quick`: only whether they are there.
         """
         issues = dict.fromkeys(self.strange_rows if names is None else (), _STRANGE)
+        if names is None and self.damaged:
+            issues[MANIFEST] = _DAMAGED
         for name in sorted(self.files if names is None else names):
             path = self.path(name)
             if name not in self.files or not os.path.lexists(path) or self._linked(name):
@@ -150,6 +171,9 @@ class Manifest:
         """Return the files of others under names that the run's commands give; none in the folder of a run."""
         if self.facts or self.damaged:
             return []
+        return self._names_of_run()
+
+    def _names_of_run(self) -> list[str]:
         inner = [f"{folder}/{name}" for folder in _FOLDERS for name in _names(self.folder / folder)]
         return sorted(name for name in [*_names(self.folder), *inner] if is_of_run(name))
 
@@ -160,7 +184,7 @@ class Manifest:
         """
         for name in self.foreign_files():
             raise OutputError(ValidationIssue("file not created by sweep; move it", str(self.folder / name)))
-        self.facts = dict(facts)
+        self.facts, self.damaged = dict(facts), False
         self.save()
 
     def write(self, contents: Mapping[str, bytes]) -> None:
@@ -215,9 +239,10 @@ class Manifest:
 
 def issues_of(folder: Path, wrong: Mapping[str, str]) -> list[ValidationIssue]:
     """Return a line for each file that is not as the run wrote it."""
+    again, away = "`sweep run` of its study makes it again", "move it away"
     return [
-        ValidationIssue(f"{what}; `sweep run` of its study makes it again", str(folder / n))
-        for n, what in wrong.items()
+        ValidationIssue(f"{what}; {away if what == _STRANGE else again}", str(folder / name))
+        for name, what in wrong.items()
     ]
 
 

@@ -26,6 +26,7 @@ from .curves import SCHEMA as CURVES_SCHEMA
 from .curves import KeptCurves
 from .facts import Provenance, checked_facts, missing_parts_error
 from .identity import MODEL_VERSION
+from .lock import in_use
 from .manifest import Manifest
 from .shown import MS, Counts, per_exposure, shown_rows
 from .tables import NAMED, NAMED_KINDS, PROVENANCE, REFERENCE, RESOLVED, SEARCHED, SWEPT, read_table
@@ -227,9 +228,8 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         names = ", ".join(folder_name(run.name) for run in manifest.runs)
         raise OutputError(ValidationIssue("holds the runs of several sensors", str(folder), allowed=f"one of {names}"))
     if PROVENANCE not in manifest.files:
-        raise OutputError(
-            ValidationIssue("no finished run here", str(folder), allowed="a folder that `sweep run` finished")
-        )
+        state = "a run goes on here" if in_use(folder) else "a run was interrupted here, and the same command continues"
+        raise OutputError(ValidationIssue(state, str(folder), allowed="a folder that `sweep run` finished"))
     optional = (manifest.files.keys() & {*files.MADE_BY_RUN, files.AUDIT}).difference(_ALWAYS)
     if not audited:
         optional.discard(files.AUDIT)

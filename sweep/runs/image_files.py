@@ -6,6 +6,7 @@ have read, and its `image_id` names it in a file of predictions.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,11 +21,15 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..base.cache import Cache
-from ..base.disk import read_facts
+from ..base.disk import digest_of
 from ..base.errors import OutputError, ValidationIssue
 from ..base.types import ChannelCurves, Parallel, Progress, delayed
 from ..camera.setup import Setup
 from ..results.atomic import atomic, write_text
+from ..results.folder import begin, run_in
+from ..results.lock import locked
+from ..results.manifest import Manifest
+from ..results.tables import read_table
 from ..study import Study
 from ..vision.batches import TOGETHER, Batch, Form, batches, images_of_split, scenes_of
 from ..vision.images import HeadCamera
@@ -35,13 +40,13 @@ from ..vision.section import Vision
 from ..vision.street import STREET, StreetCamera, count_of, draw_streets, street_shape
 from .boxed import data_yaml, write_coco, yolo_lines
 from .vision import vision_designs
-from .workers import run_with_progress
+from .workers import run_with_progress, stopped_by_signals
 
 Format = Literal["arrays", "coco", "yolo"]
 """Arrays of heads and streets, or a PNG for each street with boxes."""
 FORMATS = get_args(Format)
 MANIFEST, STREET_MANIFEST = "manifest.parquet", "street.parquet"
-_SETTINGS, _PARTS_FOLDER = "images.json", "parts"
+_PARTS_FOLDER = "parts"
 _BLOCK_PIXELS = 2**25
 """Pixels of streets that are repeated if an export is killed."""
 _COMPRESSION = 1
@@ -114,31 +119,46 @@ def write_images(
 ) -> dict[str, int]:
     """Write the images of every design, seed, order and split, and their manifests.
 
-    Deterministic; the blocks that an interrupted export has finished are kept and not repeated.
+    Deterministic; blocks of an earlier export whose files are as it wrote them are kept and not repeated.
 
-    Returns the number of images of each split, streets among them. Raises OutputError if the folder holds other images,
-    or the disk refuses.
+    Returns the number of images of each split, streets among them. Raises OutputError if the folder is in use, holds
+    other images, or the disk refuses.
     """
-    names = [str(row["name"]) for row, *_ in designs]
-    settings: dict[str, Any] = {"fingerprint": fingerprint, "format": files.format, "form": files.form}
-    settings |= {"splits": [*files.splits], "designs": names}
-    known = files.folder / _SETTINGS
+    settings: dict[str, Any] = {"run": fingerprint, "format": files.format, "form": files.form}
+    settings |= {"splits": [*files.splits], "designs": [str(row["name"]) for row, *_ in designs]}
+    facts = {"fingerprint": hashlib.sha256(json.dumps(settings).encode()).hexdigest(), "identity": settings}
     if files.folder.exists() and not files.folder.is_dir():
         raise OutputError(ValidationIssue("is no folder", str(files.folder), allowed="a new or empty folder"))
-    if known.exists():
-        if read_facts(known) != settings:
-            raise OutputError(ValidationIssue("holds other images", str(files.folder), allowed="another folder"))
-    elif files.folder.exists() and any(files.folder.iterdir()):
+    held = run_in(files.folder)
+    if held is None and files.folder.exists() and any(files.folder.iterdir()):
         raise OutputError(ValidationIssue("holds other files", str(files.folder), allowed="a new or empty folder"))
-    write_text(json.dumps(settings), known)
+    if held is not None and not held.is_of(facts):
+        raise OutputError(ValidationIssue("holds other images", str(files.folder), allowed="another folder"))
+    with stopped_by_signals(), locked(files.folder):
+        known = begin(files.folder, facts)
+        return _write_blocks(known, designs, vision, seed, fingerprint, files, parallel, progress)
+
+
+def _write_blocks(
+    known: Manifest,
+    designs: list[tuple[dict[str, Any], Setup, ChannelCurves]],
+    vision: Vision,
+    seed: int,
+    fingerprint: str,
+    files: ImageFiles,
+    parallel: Parallel,
+    progress: Progress,
+) -> dict[str, int]:
     calls, blocks = [], list[_Block]()
+    for left in files.folder.rglob(".tmp-*~"):
+        left.unlink(missing_ok=True)  # of a killed export
     for row, setup, curves in designs:
         for block in _blocks(row, setup, vision, files):
             blocks.append(block)
-            if not _is_whole(block.part(files.folder)):
+            if not _is_whole(known, block.part(files.folder)):
                 calls.append(delayed(_write_block, block, setup, curves, vision, seed, files, fingerprint))
-    for _ in run_with_progress(parallel, calls, "images written (blocks)", progress):
-        pass
+    for written in run_with_progress(parallel, calls, "images written (blocks)", progress):
+        known.add(written)
     streets = [block for block in blocks if block.order == STREET]
     heads = [block for block in blocks if block.order != STREET]
     for some, schema, name in ((heads, _SCHEMA, MANIFEST), (streets, _STREET_SCHEMA, STREET_MANIFEST)):
@@ -166,13 +186,18 @@ def _blocks(row: Mapping[str, Any], setup: Setup, vision: Vision, files: ImageFi
                         yield _Block(row, seed, order, split, start, min(start + TOGETHER, most))
 
 
-def _is_whole(part: Path) -> bool:
-    """Return whether a block is written: its part of the manifest can be read."""
-    try:
-        pq.read_metadata(part)
-    except (OSError, pa.ArrowException):
+def _is_whole(known: Manifest, part: Path) -> bool:
+    """Return whether a block's part of the manifest and the files that it names are as they were written."""
+    name = part.relative_to(known.folder).as_posix()
+    if known.wrong([name]):
         return False
-    return True
+    named = set(read_table(part, ["file"])["file"].to_pylist())
+    return not known.wrong([*named, *filter(known.files.__contains__, map(_labels_of, named))])
+
+
+def _labels_of(picture: str) -> str:
+    """Return the text of YOLO that belongs to a picture."""
+    return picture.replace("/images/", "/labels/").removesuffix(".png") + ".txt"
 
 
 def _join(parts: Sequence[Path], schema: pa.Schema, to: Path) -> None:
@@ -230,8 +255,8 @@ def _write_block(
     seed: int,
     files: ImageFiles,
     fingerprint: str,
-) -> int:
-    """Write some images, then their part of the manifest."""
+) -> dict[str, str]:
+    """Write some images, then their part of the manifest; returns the digests of the files by name."""
     camera = _cameras.get((fingerprint, block.row["design_id"]), lambda: HeadCamera(setup, curves, vision))
     key, where = _key(block.row, block.seed), (seed, block.seed)
     lamps, some = split_lamps(setup.lights, vision, where), slice(block.start, block.stop)
@@ -246,9 +271,12 @@ def _write_block(
     arrays = files.format == "arrays"
     written = _write_arrays(made, block, files) if arrays else _write_pictures(made, block, vision, files)
     tables = [pa.Table.from_pandas(t, schema=schema, preserve_index=False) for t in written]
-    with atomic(block.part(files.folder)) as hidden:
-        pq.write_table(pa.concat_tables(tables), hidden)
-    return block.stop - block.start
+    table, part = pa.concat_tables(tables), block.part(files.folder)
+    with atomic(part) as hidden:
+        pq.write_table(table, hidden)
+    named = [files.folder / name for name in set(table["file"].to_pylist())]
+    labels = [files.folder / _labels_of(name) for name in table["file"].to_pylist()] if files.format == "yolo" else []
+    return {path.relative_to(files.folder).as_posix(): digest_of(path) for path in (part, *named, *labels)}
 
 
 def _write_arrays(made: Iterable[Batch], block: _Block, files: ImageFiles) -> Iterator[pd.DataFrame]:

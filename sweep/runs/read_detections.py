@@ -11,6 +11,7 @@ import pandas as pd
 
 from ..base.disk import read_input
 from ..base.errors import DataError, ValidationIssue, nearest
+from ..spectra.read_text import number_of
 from ..vision.boxes import HEAD, POINT, Category
 from ..vision.detections import points_of
 from .score import issue_of, numbers_of, table_of
@@ -20,6 +21,8 @@ _BOX = ("left", "top", "width", "height")
 _MOST_BYTES = 500_000_000
 _MOST = 1e9
 """Of numbers in boxes and scores."""
+_BEYOND, _MANY_BEYOND = 1.05, 0.1
+"""How far beyond an image a box ends, relative to it, and of which share of them it is refused."""
 _FIELDS = 6
 """Of a line of YOLO: class, center and size as shares of the image, confidence."""
 Shape = tuple[int, int]
@@ -46,7 +49,7 @@ def read_detections(
     if path.is_dir():
         found = _of_folder(path, labels, categories, shape)
     elif path.suffix.lower() == ".json":
-        found = _of_coco(path, labels, categories)
+        found = _of_coco(path, labels, categories, shape)
     else:
         found = _of_table(path, labels, [category.state for category in categories if category.kind != HEAD])
     return found.merge(labels[["image_id", "name", "seed", "image"]], on="image_id")
@@ -63,7 +66,7 @@ def _of_folder(
     if results:
         parts = []
         for file in results:
-            parts.append(_of_coco(file, labels, categories))
+            parts.append(_of_coco(file, labels, categories, shape))
             for name in parts[-1]["image_id"].unique():
                 _once(of_image, name, file)
         return pd.concat(parts, ignore_index=True)
@@ -97,19 +100,22 @@ def _of_yolo(
     if len(fields) != _FIELDS:
         allowed = "class, center, width, height and confidence (`save_conf=True`)"
         raise DataError(ValidationIssue(f"a line of {len(fields)} fields", str(file), line, None, None, allowed))
-    try:
-        number, (x, y, width, height, score) = int(fields[0]), (float(field) for field in fields[1:])
-    except ValueError:
-        raise DataError(ValidationIssue("no number", str(file), line, None, " ".join(fields))) from None
-    if not 0 <= number < n_categories:
-        raise DataError(ValidationIssue("no class", str(file), line, None, number, f"0 to {n_categories - 1}"))
-    if not (max(abs(x), abs(y), abs(score)) < _MOST and 0 <= width <= 1 and 0 <= height <= 1):
-        problem, allowed = "no box", "shares of the width and height of the image, from 0 to 1"
+    numbers = [number_of(field) for field in fields]
+    if None in numbers:
+        raise DataError(ValidationIssue("no number", str(file), line, None, " ".join(fields)))
+    number, *shares = (float(number or 0) for number in numbers)
+    if number not in range(n_categories):
+        raise DataError(ValidationIssue("no class", str(file), line, None, fields[0], f"0 to {n_categories - 1}"))
+    if not all(0 <= share <= 1 for share in shares):
+        problem, allowed = "no box", "shares of the width and height of the image, and a confidence, from 0 to 1"
         raise DataError(ValidationIssue(problem, str(file), line, None, " ".join(fields[1:]), allowed))
-    return number, x, y, width, height, score
+    x, y, width, height, score = shares
+    return int(number), x, y, width, height, score
 
 
-def _of_coco(path: Path, labels: pd.DataFrame, categories: Sequence[Category]) -> pd.DataFrame:
+def _of_coco(
+    path: Path, labels: pd.DataFrame, categories: Sequence[Category], shape: Callable[[str], Shape]
+) -> pd.DataFrame:
     """Read results as pycocotools writes and reads them; images by number, or by the stem of their file."""
     try:
         held = json.loads(_text(path))
@@ -145,7 +151,19 @@ def _of_coco(path: Path, labels: pd.DataFrame, categories: Sequence[Category]) -
         if fault is not None:
             raise DataError(fault)
         rows.append((name, *categories[number - 1], *map(float, box), float(score)))  # type: ignore[operator, arg-type]
-    return _frame(rows)
+    found = _frame(rows)
+    _refuse_beyond(path, found, dict(zip(labels["image_id"], labels["cfa"].map(shape), strict=True)))
+    return found
+
+
+def _refuse_beyond(path: Path, found: pd.DataFrame, shapes: Mapping[str, Shape]) -> None:
+    """Refuse boxes of which many reach beyond their images, as corners do that are taken for sizes."""
+    high, wide = (found["image_id"].map(lambda name, at=at: shapes[name][at]) for at in (0, 1))
+    beyond = (found["left"] + found["width"] > _BEYOND * wide) | (found["top"] + found["height"] > _BEYOND * high)
+    if beyond.mean() > _MANY_BEYOND:
+        problem, value = "boxes reach beyond their images", f"{beyond.sum()} of {len(beyond)}"
+        allowed = "left, top, width and height in pixels of the exported images; no corners"
+        raise DataError(ValidationIssue(problem, str(path), None, None, value, allowed))
 
 
 def _is_number(value: object) -> bool:

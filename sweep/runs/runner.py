@@ -148,7 +148,6 @@ def run_study(
         facts = read_facts(manifest.path(PROVENANCE))
         if missing_keys(Provenance, facts) or (options.retry_failed and facts["failed"]):
             wrong.add(PROVENANCE)
-        manifest.remove(manifest.strange_rows)
         if not wrong:
             return ()
         backend = backend or usual_backend(study)
@@ -244,7 +243,6 @@ class _Run:
         all_columns = all_columns.set_column(at, shown.field(at), rows[ON_FRONT])
         self._write(DESIGNS, designs_of(all_columns, sample, self.selection, next(iter(self.study.scenarios))))
         self._write(PARETO, all_columns.filter(all_columns[ON_FRONT]))
-        self.manifest.remove([name for name in self.manifest.rows() if name not in self.manifest.files])
         if answer is not None:
             self._write(SEARCH_LOG, search_log(answer))
             if answer.search.map:

@@ -145,9 +145,11 @@ def street_lines(scores: pd.DataFrame) -> Iterator[str]:
             if row["name"] != first:
                 note = "" if row["ap50_apart_low"] > 0 or row["ap50_apart_high"] < 0 else ", not told apart"
                 text += f"; {_told(row, 'ap50_apart', '+')} against {first}{note}"
+            if row["ap50"] == 0:
+                text += ": no box covers its target by half; corners for sizes, or numbers of categories from 0?"
             yield f"{text}."
 
 
 def _told(row: Mapping[Any, Any], name: str, sign: str = "") -> str:
     value, low, high = (f"{row[f'{name}{end}']:{sign}.3f}" for end in ("", "_low", "_high"))
-    return f"{value} ({low} to {high})"
+    return value if low == high else f"{value} ({low} to {high})"

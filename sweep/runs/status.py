@@ -8,7 +8,7 @@ from typing import Any
 
 from ..base.answer import Answer
 from ..base.disk import read_facts
-from ..base.errors import OutputError
+from ..base.errors import DamagedRunError
 from ..metrics.share import format_share
 from ..results.answers import Answers
 from ..results.dataset import rows_in
@@ -46,8 +46,7 @@ def status(folder: Path | str, *, verify: bool = False) -> Answer:
     if manifest.runs:
         return _status_of_several(manifest, verify=verify, running=running)
     finished = PROVENANCE in manifest.files and not running
-    if (finished or (verify and not running)) and (wrong := manifest.wrong(quick=not verify)):
-        raise OutputError(issues_of(folder, wrong))
+    _require_whole(manifest, verify=verify, running=running)
     if finished:
         facts = read_facts(folder / PROVENANCE)
         state = "finished"
@@ -55,8 +54,8 @@ def status(folder: Path | str, *, verify: bool = False) -> Answer:
         lines = [f"finished: {_number(facts, 'designs'):,} designs{failed} in {_number(facts, 'duration_s'):.1f} s."]
         values = {key: facts.get(key) for key in ("designs", "failed", "duration_s")}
     else:
-        (done, parts), answers = rows_in(folder), len(Answers(folder))
-        total = _number(manifest.facts, "designs")
+        total, answers = _number(manifest.facts, "designs"), len(Answers(folder))
+        done, parts = rows_in(folder, total)
         state = "running" if running else "interrupted"
         share = f" ({format_share(done / total)})" if total else ""
         continues = "" if running else "; the same command continues"
@@ -64,20 +63,16 @@ def status(folder: Path | str, *, verify: bool = False) -> Answer:
         if answers:
             lines.append(f"The search has {answers:,} answers.")
         values = {"designs": total, "finished_designs": done, "parts": parts, "search_answers": answers}
-    if finished:
-        lines.append(f"Files: {folder}/: {RESULTS}, {REPORT}.")
-    elif parts:
+    if parts and not finished:
         lines.append(f"Finished parts: {folder / RESULTS}, which pandas.read_parquet reads.")
-    if verify and not running:
-        lines.append(f"ok: its {len(manifest.files)} files are as the run wrote them.")
+    lines += _lines_of_files(manifest, finished=finished, verified=verify and not running)
     return Answer(lines, {"folder": str(folder), "state": state, "verified": verify, **values})
 
 
 def _status_of_several(manifest: Manifest, *, verify: bool, running: bool) -> Answer:
     """Return the state of a study of several sensors or lights: a line for each of them."""
     folder, lines, states = manifest.folder, [], {}
-    if not running and (wrong := manifest.wrong(quick=not verify)):
-        raise OutputError(issues_of(folder, wrong))
+    _require_whole(manifest, verify=verify, running=running)
     for member in manifest.runs:
         inner = folder / folder_name(member.name)
         if run_in(inner) is None:
@@ -94,11 +89,33 @@ def _status_of_several(manifest: Manifest, *, verify: bool, running: bool) -> An
         f"{state}: {count} of {len(states)} runs finished"
         f"{'' if is_complete or running else '; the same command continues'}."
     )
-    if PROVENANCE in manifest.files:
-        lines.append(f"Files: {folder}/: {RESULTS}, {REPORT}.")
-    if verify and not running:
-        lines.append(f"ok: its {len(manifest.files)} files are as the run wrote them.")
+    finished = PROVENANCE in manifest.files
+    lines += _lines_of_files(manifest, finished=finished, verified=verify and not running)
     return Answer(lines, {"folder": str(folder), "state": state, "verified": verify, "runs": states})
+
+
+def _require_whole(manifest: Manifest, *, verify: bool, running: bool) -> None:
+    """Raise DamagedRunError for files of a finished run that are missing, or that `verify` finds otherwise wrong."""
+    finished = PROVENANCE in manifest.files
+    if running or not (verify or finished):
+        return
+    wrong = manifest.wrong(None if verify else manifest.files, quick=not verify)
+    if verify and finished and REPORT not in manifest.files:
+        wrong[REPORT] = "is not drawn"
+    if wrong:
+        raise DamagedRunError(issues_of(manifest.folder, wrong))
+
+
+def _lines_of_files(manifest: Manifest, *, finished: bool, verified: bool) -> list[str]:
+    """Return what there is in the folder, and what does not belong there."""
+    lines = list(manifest.notes)
+    if finished and REPORT in manifest.files:
+        lines.append(f"Files: {manifest.folder}/: {RESULTS}, {REPORT}.")
+    elif finished:
+        lines.append(f"Files: {manifest.folder}/: {RESULTS}; `sweep report {manifest.folder}` draws its report.")
+    if verified:
+        lines.append(f"ok: its {len(manifest.files)} files are as the run wrote them.")
+    return lines
 
 
 def _number(facts: Mapping[str, Any], key: str) -> float:

@@ -82,7 +82,7 @@ class Sweep:
     def __post_init__(self) -> None:
         self.folder = self.manifest.folder.absolute()  # a worker may be elsewhere
         refuse_others(self.folder)
-        self.held = self.pool.hold(self.planned)
+        self.held = self.pool.hold(self.planned, self.folder)
 
     @cached_property
     def parts(self) -> list[Part]:

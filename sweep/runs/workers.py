@@ -5,8 +5,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
-import re
-import shutil
 import signal
 import tempfile
 import threading
@@ -33,8 +31,6 @@ _LIBRARIES = ("numba", "matplotlib.figure", "sweep.runs.search")
 """What calls of workers load."""
 STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Signals that stop a run; Windows has no SIGHUP."""
-_LEFT = re.compile(r"(?:sem\.loky-|joblib_memmapping_folder_)(\d+)[-_]")
-"""Names of what joblib keeps in shared memory and temporary folders, with the number of its process."""
 _stop = threading.Event()
 """A stop was asked for. Compiled libraries may swallow the exception by which the signal's handler says so, or raise
 another one in its place, as if a design had failed."""
@@ -65,24 +61,24 @@ def _held(path: Path) -> Held:
 class Workers:
     """Workers of a backend, each with one thread for its libraries.
 
-    `n_jobs`: workers on this machine, at most one for each core; those of a cluster are used as they are. `folder`: a
-    temporary one for what worker processes of this machine share.
+    `n_jobs`: workers on this machine, at most one for each core; those of a cluster are used as they are.
     """
 
     n_jobs: int
     backend: str = "loky"
-    folder: Path | None = None
 
-    def hold(self, value: Any) -> Held:
-        """Return a value that calls may name: worker processes on this machine read it once each."""
-        if self.folder is None:
+    def hold(self, value: Any, folder: Path) -> Held:
+        """Return a value that calls may name: worker processes on this machine read it once each, from a file.
+
+        The file lies in the locked folder of a run, and goes with the lock, or with that of the next run.
+        """
+        if self.backend != "loky":
             return Held(value, None)
         try:
-            with tempfile.NamedTemporaryFile(dir=self.folder, delete=False) as file:
+            with tempfile.NamedTemporaryFile(dir=folder, prefix=f".tmp-{os.getpid()}-", delete=False) as file:
                 pickle.dump(value, file)
         except OSError as error:
-            problem = f"cannot be written: {error.strerror or error}"
-            raise SweepError(ValidationIssue(problem, str(self.folder))) from None
+            raise SweepError(ValidationIssue(f"cannot be written: {error.strerror or error}", str(folder))) from None
         return Held(value, Path(file.name))
 
     @property
@@ -160,9 +156,7 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
     Raises SweepError if Dask is not installed, or its scheduler does not answer.
     """
     settings: dict[str, Any] = {}
-    folder: Path | None = None
     backend = backend_here(backend)
-    _remove_what_the_dead_left()
     # These filters stay: joblib may warn of cancelled calls after a stop has left the block.
     warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)
     warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
@@ -171,11 +165,11 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
             stack.enter_context(_client(scheduler))
         elif backend == "loky":
             _start_quiet_tracker()
-            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sweep-")))
             settings = {"inner_max_num_threads": 1, "initializer": _begin_worker, "initargs": (os.getpid(),)}
+            settings["max_nbytes"] = None  # arrays go with their calls: no files that a killed run would leave
         stack.enter_context(threadpool_limits(limits=1))  # with one worker, and with threads, this process computes
         stack.enter_context(joblib.parallel_config(backend, **settings))
-        yield Workers(n_jobs, backend, folder)
+        yield Workers(n_jobs, backend)
 
 
 def backend_here(backend: str) -> str:
@@ -200,18 +194,6 @@ def _start_quiet_tracker() -> None:
             del os.environ["PYTHONWARNINGS"]
         else:
             os.environ["PYTHONWARNINGS"] = before
-
-
-def _remove_what_the_dead_left() -> None:
-    """Remove semaphores and shared arrays of joblib whose process is gone: killed with its whole group."""
-    for place in {Path("/dev/shm"), Path(tempfile.gettempdir())}:
-        with suppress(OSError):
-            for left in place.iterdir():
-                owner = _LEFT.match(left.name)
-                if owner is None or psutil.pid_exists(int(owner[1])):
-                    continue
-                with suppress(OSError):  # of another user
-                    shutil.rmtree(left) if left.is_dir() else left.unlink()
 
 
 def run_with_progress(parallel: Parallel, calls: Sequence[Call], phase: str, progress: Progress) -> Iterator[Any]:
@@ -242,9 +224,9 @@ def stopped_by_signals() -> Iterator[None]:
     except KeyboardInterrupt:
         raise InterruptedRunError(_STOPPED) from None
     finally:
-        _stop.clear()
         for number, handler in before.items():
             signal.signal(number, handler)
+        _stop.clear()
 
 
 def raise_if_stopped() -> None:

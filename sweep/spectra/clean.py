@@ -70,8 +70,11 @@ class Cleaner:
         low = values < 0
         if low.any() and np.isfinite(noise):
             if -values.min() <= max(_NOISE_SHARE * values.max(), noise):
-                self._note(name, f"negatives of noise, down to {values.min():.3g}, were set to 0")
+                lowest, whole = values.min(), np.trapezoid(values, wave)
                 values[low] = 0.0
+                added = f"{np.trapezoid(values, wave) / whole - 1:.1%}" if whole > 0 else "all"
+                done = f"negatives of noise, down to {lowest:.3g}, were set to 0"
+                self._note(name, f"{done}, which adds {added} to its sum")
             elif not faulty:
                 at = int(np.argmin(values))
                 allowed = ">= 0, or noise of up to 2 % of the peak"

@@ -27,6 +27,11 @@ NORMALIZED = (
     "and what a stated exposure gives are then those of a pixel with that QE; `scale` brings them to the pixel's own"
 )
 """A note of curves that `is_normalized_response`."""
+EACH_NORMALIZED = (
+    "each channel has the same maximum, so the ratios between channels are lost; distances, also of any brightness, "
+    "and light are then of a sensor whose channels are equally bright; curves of one scale bring the ratios back"
+)
+"""A note of several channels with equal tops."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +158,14 @@ def notes(facts: Facts, *, as_qe: bool) -> list[str]:
         lines.append(f"no value is above 0: {', '.join(dark)}")
     if as_qe and is_normalized_response(max(curve.peak for curve in facts.curves)):
         lines.append(NORMALIZED)
+    if as_qe and is_each_normalized([curve.peak for curve in facts.curves]):
+        lines.append(EACH_NORMALIZED)
     return lines
+
+
+def is_each_normalized(tops: Sequence[float]) -> bool:
+    """Return whether several channels have one maximum."""
+    return len(tops) > 1 and 0 < max(tops) <= min(tops) * (1 + _NEARLY)
 
 
 def is_normalized_response(top: float) -> bool:

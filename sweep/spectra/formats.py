@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import io
 import json
 import math
@@ -261,12 +260,6 @@ def _spdx_sheet(path: Path) -> Sheet:
 def _excel_sheet(path: Path) -> Sheet:
     """Read the first sheet of a spreadsheet that has a table."""
     file, content = str(path), read_input(path, MOST_BYTES, DataError)
-    if importlib.util.find_spec("openpyxl") is None:
-        raise DataError(
-            ValidationIssue(
-                "a spreadsheet needs the extra `xlsx`", file, allowed="pip install 'cfa-sweep[xlsx]', or CSV"
-            )
-        ) from None
     import pandas as pd  # noqa: PLC0415  (slow to import)
 
     try:

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..base.errors import ValidationIssue
-from .layouts import UNITS_NM, WAVELENGTH, rising, wave_unit, wave_unit_of_word
+from .layouts import UNITS_NM, WAVELENGTH, refuse_other_axis, rising, wave_unit, wave_unit_of_word
 from .read_text import Rows, Sheet
 from .spectrum import Unit
 from .units import begun_by_quantity, folded, stated_in_title, symbol_unit, unit_of
@@ -77,6 +77,7 @@ def wave_columns(table: Table, heads: Heads) -> list[int]:
             waves[at] = UNITS_NM.get(folded(units[at]), wave)
     found = [at for at, wave in enumerate(waves) if wave is not None] or _unnamed_waves(table, names)
     if not found:
+        refuse_other_axis(table.sheet.file, heads.line, names[0] if names else "")
         first = names[0] if names else ""
         table.fault("no column wavelength", heads.line, first, first, f"`{WAVELENGTH}` as the first column")
         found = [0]

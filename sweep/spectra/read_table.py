@@ -44,6 +44,7 @@ _SPREAD = re.compile(
 """Heads of columns that are no curves."""
 _NOISE_OD = 0.05
 """Negatives of optical densities that are noise of the baseline."""
+_LEAST_UNLIKELY_NM = 2500.0
 _MOST_UM = 1.65
 """Largest wavelength without a unit that is taken for um: from 1.65 eV on, light is visible."""
 
@@ -297,6 +298,11 @@ def _scan(table: Table, columns: Sequence[_Column], numbers: Float[Array, "rows 
     elif factor != 1:
         sheet.notes.append(f"wavelengths in {UNIT_WORDS[factor]} were brought to nm")
     nm = {at: wave if factor == 1 else np.round(wave * factor, 6) for at, wave in waves.items()}
+    lowest = min((float(np.nanmin(wave)) for wave in nm.values() if np.isfinite(wave).any()), default=0.0)
+    if lowest >= _LEAST_UNLIKELY_NM:
+        problem = "no wavelength that a camera sees: angstrom, or wavenumbers in 1/cm?"
+        allowed = "a head with the unit of wavelengths"
+        raise DataError(ValidationIssue(problem, sheet.file, value=f"{lowest:g} nm and more", allowed=allowed))
     cleaner = Cleaner(sheet.file, table.issues)
     curves = []
     for column in columns:

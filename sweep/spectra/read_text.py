@@ -17,6 +17,7 @@ from ..base.disk import read_input
 from ..base.errors import DataError, ValidationIssue
 
 MOST_BYTES = 40_000_000
+_MOST_LINES = 200_000
 Rows = list[tuple[int, list[str]]]
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _CONTROLS = re.compile(rb"[\x01-\x08\x0e-\x19\x1c-\x1f]")
@@ -28,7 +29,7 @@ _SAMPLED = 400
 _NEARLY = 0.9
 """Share of the best score from which on the first of the separators is taken: a title of words has few numbers."""
 _MARKS = {"\t": "tabs", ";": "semicolons", ",": "", "|": "bars", " ": "blanks"}
-NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eEdD][+-]?[0-9]+)?")
 _LEADING_ZEROS = re.compile(r"[+-]?0\d.*")
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
@@ -89,7 +90,7 @@ def number_of(cell: str) -> float | None:
     """Return a finite number as tables have it, without Python's underscores and other scripts' digits."""
     cell = cell.strip()
     usual = NUMBER.fullmatch(cell) and not _LEADING_ZEROS.fullmatch(cell) and not _OVERFLOW.fullmatch(cell)
-    number = float(cell) if usual else np.nan
+    number = float(cell.upper().replace("D", "E")) if usual else np.nan
     return number + 0.0 if np.isfinite(number) else None
 
 
@@ -97,6 +98,8 @@ def text_sheet(path: Path, allowed: str = "a header `wavelength_nm,...` and rows
     """Return the rows of a text. Raises DataError where it is none, or empty."""
     text, notes = _decoded(path)
     file, lines = str(path), re.split(r"\r\n|\r|\n", text)
+    if len(lines) > _MOST_LINES:
+        raise DataError(ValidationIssue("too many lines", file, value=len(lines), allowed=f"at most {_MOST_LINES:,}"))
     sheet = Sheet(file, [], notes)
     numbered = list(enumerate(lines, 1))
     if _PACKED.search(text[:_BEGINNING_BYTES]):
@@ -143,7 +146,7 @@ def _commented_heads(file: str, comments: Sequence[tuple[int, str]], mark: str, 
         return []
     above = [(n, text) for n, text in comments if n < first and text][-1:]
     head_rows = _cells(file, above, mark) if above else []
-    return [row for row in head_rows if len(row[1]) == len(rows[0][1]) > 1]
+    return [row for row in head_rows if len(row[1]) > 1 and len(rows[0][1]) - len(row[1]) in (0, 1)]
 
 
 def _decoded(path: Path) -> tuple[str, list[str]]:
@@ -205,19 +208,24 @@ def _cells(file: str, lines: Sequence[tuple[int, str]], mark: str) -> Rows:
 
 
 def _find_decimal(sheet: Sheet) -> None:
-    """Find the decimal mark: a comma where numbers have some, and none has a point. DataError where it is unclear."""
+    """Find the decimal mark: a comma where numbers have some, and none has a point. DataError where it is unclear.
+
+    Where all numbers of a column have a comma before three digits, it is one: another scale of a light changes nothing,
+    and no share is above 1,000.
+    """
     sampled = [sheet.rows[int(at)] for at in np.unique(np.linspace(0, len(sheet.rows) - 1, _SAMPLED).astype(int))]
-    cells = [cell.rstrip("%").strip() for _, row in sampled for cell in row]
+    cells, unclear = [cell.rstrip("%").strip() for _, row in sampled for cell in row], False
     for column in zip_longest(*(row for _, row in sampled), fillvalue=""):
         dotted = [cell for cell in column if _DOTTED.fullmatch(cell)]
         integers = [cell for cell in column if cell.isdigit() and int(cell[:6]) >= 100]
+        unclear = unclear or (bool(integers) and any(_THOUSANDS.fullmatch(cell) for cell in column))
         if dotted and integers and len(dotted) == sum("." in cell for cell in column) and float(dotted[0]) < 100:
             problem, allowed = "a point may be a decimal mark or part every three digits", "numbers without it"
             raise DataError(ValidationIssue(problem, sheet.file, value=dotted[0], allowed=allowed))
     commas = [cell for cell in cells if _COMMA.fullmatch(cell) or _THOUSANDS.fullmatch(cell)]
     if not commas or any("." in cell and NUMBER.fullmatch(cell) for cell in cells):
         return
-    if all(_THOUSANDS.fullmatch(cell) for cell in commas):
+    if unclear and all(_THOUSANDS.fullmatch(cell) for cell in commas):
         problem, allowed = "a comma may be a decimal mark or part every three digits", "numbers without it"
         raise DataError(ValidationIssue(problem, sheet.file, value=commas[0], allowed=allowed))
     sheet.decimal = ","

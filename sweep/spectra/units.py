@@ -41,8 +41,8 @@ SAID: dict[Quantity, str] = {
 }
 _RELATIVE_NM = 400.0
 """Where a relative response per energy is also its relative QE, so that files of one sensor have one scale."""
-_WHOLE_PERCENT = (10.0, 130.0)
-"""Largest values between which a file without a unit is taken for percent."""
+_WHOLE_PERCENT = (20.0, 130.0)
+"""Largest values between which a file without any unit is taken for percent."""
 _NOISE = 0.05
 """Noise above a share of 1."""
 
@@ -61,7 +61,6 @@ _SYMBOLS: tuple[tuple[str, Quantity | None, float | None], ...] = (
     (r"qe|eqe", "qe", None),
     (r"t|transmission|transmittance", "transmission", None),
     (r"(photons?|quanta|ph|[munp]?mol)" + _PER, "photons", 1.0),
-    (r"counts?|cts|adu", "photons", 1.0),
     (r"[munk]?(w|watts?|j)" + _PER, "energy", 1.0),
     (r"1|-|fraction|none|dimensionless|ratio|0(\.\.\.?|-|to)1|nm-1|1/nm", None, 1.0),
     (r"a\.u\.|arb\..*|arbitrary.*|rel\.?|relative|norm\.?|normali[sz]ed|normiert", None, 1.0),
@@ -78,16 +77,15 @@ _WORDS: tuple[tuple[str, Quantity], ...] = (
     (r"reflectance|reflectivity|remission|reflexionsgrad|remissionsgrad", "reflectance"),
     (_PHOTONS, "photons"),
     (r"ir ?radiance|radiance|radiant|spd|energy|energie|watts?|strahldichte|bestrahlungsstarke|leistung", "energy"),
-    (r"counts?|cts", "photons"),
 )
 _EXCLUSIVE: frozenset[Quantity] = frozenset({"qe", "responsivity", "transmission", "density", "reflectance"})
 """Quantities of which no two can be meant; a `photon irradiance (umol/m2/s/nm)` is one of photons."""
 _UNCLEAR = re.compile(
     r"\b(absorption|absorptance|absorptivity|absorbing|extinction|response|sensitivity|empfindlichkeit|sensibilite"
     r"|reponse|luminance|lumen|lux|loss|attenuation|dampfung|reflection|blocking|emissivity|napierian|base e"
-    r"|coefficient|log|log10|ln|return loss|1 t|scatter\w*|haze)\b"
+    r"|coefficient|log|log10|ln|return loss|1 t|scatter\w*|haze|internal|tau i|ti|counts?|cts|adu)\b"
 )
-_OTHERWISE = re.compile(r"napierian|base e|coefficient|return|^log|^1 t")
+_OTHERWISE = re.compile(r"napierian|base e|coefficient|return|internal|^log|^1 t")
 """Words by which a quantity that is named is another one."""
 _LOSS = re.compile(r"\b(attenuation|insertion loss|loss|dampfung)\b")
 _WHOLE: dict[str, Quantity] = {"t": "transmission", "abs": "density", "density": "density"}
@@ -101,7 +99,20 @@ _BRACKETS = re.compile(r"[\[(]([^\[\]()]*(?:\([^()]*\)[^\[\]()]*)*)[\])]")
 _PERCENT_OF = re.compile(r"(?:\b100\s*)?%\s*([tr])\b|\b([tr])\s*%", re.IGNORECASE)
 """`%T`, `T%` and `Baseline 100%T`, as photometers write them."""
 _LEADING = re.compile(r"^\s*(%)\s*(?=[^\W\d_]{2})")
-_TRAILING = re.compile(r"(?:(?:^|[\s_,:/])(od|m?a[/_ ]w(?:\^?-1)?|db|percent|pct)|(%|\u2030))\s*$", re.IGNORECASE)
+_ATOM = (
+    r"(?:[munpk\u00b5\u03bc]?(?:w|j|mol|a|v|lm|lx|cd|s|ev|g|m)|[tgmk]?hz|cm|sr|dn|lsb|adu|counts?|cts|e-?|electrons?"
+    r"|ph|photons?|quanta|db|1)"
+)
+_POWER = r"(?:\^?-?\d)?"
+_COMPOUND = (
+    rf"{_ATOM}{_POWER}(?:(?: ?/ ?| per |[_ .\u00b7](?=[a-z]+\^?-\d)|(?<=[a-z\d])[.\u00b7*])\(?{_ATOM}{_POWER}\)?)+"
+    r"|[munc\u00b5\u03bc]m\^?-\d"
+)
+"""Units of several: `DN/(nJ/cm2)`, `e-/lx/s`, `W m-2 nm-1`, `V/lx.s`; and 1 over a length."""
+_TRAILING = re.compile(
+    rf"(?:(?:^|[\s_,:])({_COMPOUND})|(?:^|[\s_,:/])(od|m?a[/_ ]w(?:\^?-1)?|db|percent|pct)|(%|\u2030))\s*$",
+    re.IGNORECASE,
+)
 
 
 def stated_quantity(word: str | None) -> Quantity | None:
@@ -190,7 +201,10 @@ def unit_of(head: str) -> Unit:
         return unknown[0]
     quantity = next(iter(quantities), None)
     if _UNCLEAR.search(bare) and (quantity is None or _OTHERWISE.search(bare)):
-        return Unit(head, unclear="does not tell its quantity")
+        counts = re.search(r"\b(counts?|cts|adu)\b", bare)
+        return Unit(
+            head, unclear="is of a spectrometer without calibration" if counts else "does not tell its quantity"
+        )
     said = ", ".join([*(unit.words for unit in found), *(SAID[word].split(",")[0] for word in stated)])
     return Unit(said, quantity, next(iter(factors), None), loss=bool(_LOSS.search(bare)))
 
@@ -246,7 +260,7 @@ def used_as(
         unit, quantity = curves.units.get(name, Unit()), asked(name)
         vague = unit.unclear and not (use == "light" and re.search("respon|sensiti|empfind", folded(unit.words)))
         if stated is None and unit.quantity is None and use in ("sensor", "filter") and name_of(name) in _SINGLE:
-            raise DataError(_unclear(curves, name, "absorbance, or a name?", "", use))
+            raise DataError(_unclear(curves, name, "absorbance (`quantity: density`), or a name?", "", use))
         if stated is None and vague:
             raise DataError(_unclear(curves, name, f"the head {unit.unclear}", unit.words, use))
         if quantity not in FITTING[use]:
@@ -256,7 +270,8 @@ def used_as(
             )
         factor, note, fault = 1.0, "", ""
         if not scaled:
-            note, fault = _plausible(unit, quantity, top(name), stated=stated is not None)
+            bare = all(other.factor is None and not other.unclear for other in curves.units.values())
+            note, fault = _plausible(unit, quantity, top(name), stated=stated is not None, bare=bare)
         if fault:
             raise DataError(_unclear(curves, name, fault, unit.words, use))
         if not scaled and quantity not in ("density", "decibel", "relative_responsivity", "energy", "photons"):
@@ -275,8 +290,11 @@ def used_as(
     return replace(curves, values=values, notes=(*curves.notes, *notes), units=units)
 
 
-def _plausible(unit: Unit, quantity: Quantity, top: float, *, stated: bool) -> tuple[str, str]:
-    """Return a note where percent are assumed, and why the largest number `top` cannot be; empty for neither."""
+def _plausible(unit: Unit, quantity: Quantity, top: float, *, stated: bool, bare: bool) -> tuple[str, str]:
+    """Return a note where percent are assumed, and why the largest number `top` cannot be; empty for neither.
+
+    `bare`: no column of the file has a unit.
+    """
     if quantity == "density":
         return "", f"values up to {top:.4g} are no {SAID[quantity].split(',')[0]}" if top > _MOST_DENSITY else ""
     if quantity not in ("qe", "transmission", "reflectance"):
@@ -285,7 +303,7 @@ def _plausible(unit: Unit, quantity: Quantity, top: float, *, stated: bool) -> t
         return "", "" if top > 1.0 + _NOISE or stated else "values in percent, but none is above 1"
     if top <= 1.0 + _NOISE:
         return "", ""
-    if unit.factor is None and _WHOLE_PERCENT[0] <= top <= _WHOLE_PERCENT[1]:
+    if bare and _WHOLE_PERCENT[0] <= top <= _WHOLE_PERCENT[1]:
         return f"values up to {top:.4g} are assumed to be percent", ""
     return "", f"values up to {top:.4g} are no {SAID[quantity]}"
 

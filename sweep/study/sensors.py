@@ -14,7 +14,7 @@ from ..camera.scene import WhitePatchExposure
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
 from ..camera.sensor_field import PLACES, SensorField
 from ..designs.space import Space
-from ..spectra.facts import NORMALIZED, is_normalized_response
+from ..spectra.facts import EACH_NORMALIZED, NORMALIZED, is_each_normalized, is_normalized_response
 from ..spectra.units import FITTING, Use
 from .document import KeyPath
 from .schema import StudySection
@@ -130,10 +130,13 @@ def _columns(
         return {}
     if known is not None and entry.relative_to is None:
         present = [column for column in entry.columns.values() if column in known.values]
-        top = max((float(known.samples(column)[1].max()) for column in present), default=0.0)
+        tops = [float(known.samples(column)[1].max()) for column in present]
+        top = max(tops, default=0.0)
         relative = any(known.units[column].quantity == "relative_responsivity" for column in present)
         if relative or is_normalized_response(entry.scale * top):
             sources.warnings.append(f"{entry.file}: {NORMALIZED}")
+        if is_each_normalized(tops):
+            sources.warnings.append(f"{entry.file}: {EACH_NORMALIZED}")
     scaled = {}
     for name, column in entry.columns.items():
         place = (*path, "columns", name)

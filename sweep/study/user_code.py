@@ -11,7 +11,18 @@ from pydantic import ValidationError
 
 from ..base.disk import is_file
 from ..base.errors import Fault, SweepError, ValidationIssue, faults_of, unknown
-from ..base.user_code import CODE_OF, Installed, Offered, UserCode, file_of, installed, is_in_file, offers, read_code
+from ..base.user_code import (
+    CODE_OF,
+    Installed,
+    Offered,
+    UserCode,
+    beside,
+    file_of,
+    installed,
+    is_in_file,
+    offers,
+    read_code,
+)
 from ..camera.irradiance import scene_irradiance
 from ..camera.scene import Scene
 from ..camera.setup import Setup
@@ -21,6 +32,7 @@ from ..metrics.quantity import WORST, RequestedQuantities
 from ..metrics.registry import quantities_of
 from ..metrics.smooth import smooth_response
 from ..metrics.user_metrics import Readings, UserMetric
+from ..spectra.formats import digest
 from .document import KeyPath
 from .model import Study
 from .schema import StudySection
@@ -72,8 +84,10 @@ def code_of(sources: Sources, name: str, group: Offered) -> UserCode:
     place = next((folder / file for folder in sources.folders if is_file(folder / file)), None)
     if place is None:
         raise SweepError(ValidationIssue("no such file", value=file, allowed=f"a path relative to {sources.searched}"))
-    source, digest = read_code(place)
-    _digested(sources, file, digest)
+    source, own = read_code(place)
+    _digested(sources, file, own)
+    for needed in beside(place, source):
+        _digested(sources, f"{CODE_OF}{file}: {needed.relative_to(place.parent).as_posix()}", digest(needed))
     return UserCode(name, source)
 
 
