@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import threading
+import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 _Key = TypeVar("_Key", bound=Hashable)
 _Value = TypeVar("_Value")
+
+_all: weakref.WeakSet[Cache[Any, Any]] = weakref.WeakSet()
 
 
 class Cache(Generic[_Key, _Value]):
@@ -21,6 +25,7 @@ class Cache(Generic[_Key, _Value]):
         self._most = most
         self._values: OrderedDict[_Key, _Value] = OrderedDict()
         self._lock = threading.RLock()
+        _all.add(self)
 
     def __len__(self) -> int:
         return len(self._values)
@@ -34,3 +39,13 @@ class Cache(Generic[_Key, _Value]):
                     self._values.popitem(last=False)
             self._values.move_to_end(key)
             return self._values[key]
+
+
+def _after_fork() -> None:
+    """Give a forked process locks of its own: a thread that it has not may have held those of its parent."""
+    for cache in _all:
+        cache._lock = threading.RLock()  # noqa: SLF001
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)

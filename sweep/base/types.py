@@ -19,8 +19,11 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+
     Array = FloatArray
 else:
+    ModelMetaclass = type(BaseModel)
     Array = np.ndarray
 """An array whose numbers the name before the bracket says, and whose shape the text behind it."""
 
@@ -81,7 +84,7 @@ def in_turn(calls: Iterable[Call]) -> Iterator[Any]:
         yield function(*arguments, **named)
 
 
-class _Told(type(BaseModel)):  # type: ignore[misc]
+class _Told(ModelMetaclass):
     """Class whose calls tell what is wrong as all of the package does."""
 
     def __call__(self, *arguments: Any, **keys: Any) -> Any:

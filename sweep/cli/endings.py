@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
+import tempfile
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from typing import Any, NoReturn
@@ -15,6 +17,8 @@ from ..base.errors import SweepError
 
 _INTERRUPTED, _BROKEN_PIPE = 130, 141
 """Exit codes of a shell for a command that SIGINT or SIGPIPE ended."""
+_interrupts: list[int] = []
+"""Signals that came."""
 _UsageError: Any = typer.BadParameter.__bases__[0]
 """Click's, wherever this version of typer has it."""
 
@@ -30,16 +34,16 @@ def ends_in_lines(command: Callable[[], object]) -> NoReturn:
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):  # a letter that the terminal does not know is no issue
                 stream.reconfigure(errors="backslashreplace")
-        for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):  # a terminal that closes
-            if signal.getsignal(number) is not signal.SIG_IGN:
-                signal.signal(number, signal.default_int_handler)
+        _take_signals()
         result = command()
         _flush()
         code = result if isinstance(result, int) else 0
         if code == _INTERRUPTED:
             print_issues(["interrupted"])
     except Exception as error:
-        code = _exit_code(error)
+        if _interrupts:  # a library that was loading made another error of it
+            print_issues(["interrupted"])
+        code = _INTERRUPTED if _interrupts else _exit_code(error)
     except KeyboardInterrupt:
         print_issues(["interrupted"])
         code = _INTERRUPTED
@@ -59,6 +63,17 @@ def ends_in_lines(command: Callable[[], object]) -> NoReturn:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.SIG_DFL)
     sys.exit(code)
+
+
+def _take_signals() -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _interrupt)
+
+
+def _interrupt(number: int, *_: object) -> None:
+    _interrupts.append(number)
+    raise KeyboardInterrupt
 
 
 def _flush() -> None:
@@ -106,6 +121,8 @@ def _text(error: Any) -> str | None:
         text = "out of memory; fewer workers (--jobs) need less"
     elif isinstance(error, OSError):
         names = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, (str, bytes))]
+        if error.errno == errno.ENOSPC and not names:
+            names = [f"shared memory (/dev/shm) or the temporary folder ({tempfile.gettempdir()})"]
         text = ": ".join([*names, error.strerror or str(error) or type(error).__name__])
     elif isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
         text = f"file name is not UTF-8 (got {error.object!r})"

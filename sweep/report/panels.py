@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 Values = Float[Array, " numbers"]
 _ABOVE, _BELOW, LEFT = 34, 52, 62
 """Room of a panel for its title, its axis and its numbers, px."""
+_MOST_MARGIN, _PX_PER_LETTER = 0.7, 8.5
+"""Share of a panel's width that names may take, and the width of a letter; longer names are cut."""
 
 
 class Panel(Protocol):
@@ -95,13 +97,22 @@ class Picture:
                 left, right = (
                     own if side is None else side for own, side in zip(panel.room(wide=wide), sides, strict=True)
                 )
+                fits = min(1.0, _MOST_MARGIN * width / (left + right))
+                left, right = fits * left, fits * right
                 axes = place(figure, at * width + left, top + _ABOVE, width - left - right - 12, panel.tall(wide=wide))
                 title = panel.title if wide else "\n".join(textwrap.wrap(panel.title, 44))
                 axes.text(0, 1, title, transform=axes.transAxes + offset(axes, 0, 12), fontsize=font(figure),
                           fontweight="bold", color=INK)  # fmt: skip
                 panel.draw(axes)
+                for text in axes.texts if fits < 1 else ():
+                    letters = int(max(left, right) / _PX_PER_LETTER)
+                    text.set_text("\n".join(_cut(line, letters) for line in text.get_text().split("\n")))
             top += height
         return figure
+
+
+def _cut(line: str, letters: int) -> str:
+    return line if len(line) <= letters else f"{line[: letters - 1]}\u2026"
 
 
 def right_of(names: Iterable[str], *, wide: bool) -> float:

@@ -92,9 +92,12 @@ class Manifest:
             problem = "is damaged, so that nothing is known of the run; move its folder away"
             raise OutputError(ValidationIssue(problem, str(self.path(MANIFEST)), allowed="another --output"))
         if not self.fingerprint:
-            raise OutputError(
-                ValidationIssue("no run here", str(self.folder), allowed="a folder that `sweep run` made")
+            made_by = read_facts(self.path(PROVENANCE)).get("versions", {})
+            version = made_by.get("cfa-sweep") if isinstance(made_by, dict) else None
+            problem = (
+                "no run here" if version is None else f"a run of version {version} of sweep, which had no manifest"
             )
+            raise OutputError(ValidationIssue(problem, str(self.folder), allowed="a folder that `sweep run` made"))
 
     @property
     def runs(self) -> list[SensorAndLights]:
