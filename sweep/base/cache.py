@@ -44,7 +44,7 @@ class Cache(Generic[_Key, _Value]):
 def _after_fork() -> None:
     """Give a forked process locks of its own: a thread that it has not may have held those of its parent."""
     for cache in _all:
-        cache._lock = threading.RLock()  # noqa: SLF001
+        cache._lock = threading.RLock()
 
 
 if hasattr(os, "register_at_fork"):
