@@ -29,13 +29,13 @@ scenarios:
 
 @pytest.mark.long
 def test_presets_are_measured_in_every_scene(tmp_path: Path) -> None:
-    path, progress = tmp_path / "two.yaml", list[tuple[str, int, int]]()
+    path = tmp_path / "two.yaml"
     path.write_text(TWO_SCENES)
 
     def at_step(step_nm: float | None) -> Study:
         return load_study(path, changes={"wavelengths.step_nm": step_nm} if step_nm else {})
 
-    measure_accuracy(at_step, tmp_path, lambda *call: progress.append(call), steps_nm=[10.0])
+    measure_accuracy(at_step, tmp_path, lambda *_: None, steps_nm=[10.0])
     table = pd.read_parquet(tmp_path / "accuracy.parquet").set_index(["scenario", "setting"])
     names = ("10 nm", "standard", "reference")
     assert list(table.index) == [(scene, name) for scene in ("chart", "anywhere") for name in names]
@@ -43,10 +43,7 @@ def test_presets_are_measured_in_every_scene(tmp_path: Path) -> None:
     assert (error_dn["reference"] == 0).all()
     assert (error_dn["10 nm"] > error_dn["standard"]).all()
     assert error_dn.loc["anywhere", "standard"] > error_dn.loc["chart", "standard"]
-    assert (table["following_s"] > 0).all()
     assert (table["designs"] == 2).all()
-    assert progress[0] == ("measurements", 0, 6)
-    assert progress[-1] == ("measurements", 6, 6)
     assert (tmp_path / "accuracy.png").is_file()
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import colour
 import matplotlib.image
 import numpy as np
 import pytest
@@ -18,21 +17,6 @@ from sweep.study.editors import schema_text
 from ..commanded import commanded
 from ..conftest import MEASURED, SHARED, needs_measured
 from ..curve_texts import WAVE, bell, csv
-
-
-def test_lights_have_the_chromaticity_that_colour_science_gives(tmp_path: Path) -> None:
-    path = csv(tmp_path, "wavelength_nm,led", WAVE, bell(590, 20))
-    fine = np.arange(360.0, 781.0)
-    # Straight lines between the samples of what the file says, as the tool takes them.
-    values = np.interp(fine, WAVE, bell(590, 20))
-    for quantity, energy in (("energy", values), ("photons", values / fine)):
-        light = colour.SpectralDistribution(energy, fine)
-        oracle = colour.XYZ_to_xy(colour.sd_to_XYZ(light, method="Integration"))
-        (line,) = (
-            line for line in describe(path, output=tmp_path, quantity=quantity).lines if line.startswith("  led")
-        )
-        words = line.split("xy ")[1].replace(",", "").split()
-        np.testing.assert_allclose([float(words[0]), float(words[1])], oracle, atol=4e-4)
 
 
 @pytest.mark.parametrize(
@@ -52,11 +36,7 @@ def test_monochromatic_light_lies_in_its_region(peak_nm: int, region: str | None
     assert (color.distance == 0) == (region is not None)
 
 
-def test_white_purple_and_darkness_are_no_signal() -> None:
-    flat = light_color(np.ones(VISIBLE.size) * VISIBLE.nodes_nm)  # equal energy
-    assert flat is not None
-    np.testing.assert_allclose(flat.xy, (1 / 3, 1 / 3), atol=1e-3)
-    assert flat.signal is None
+def test_purple_and_darkness_are_no_signal() -> None:
     purple = np.zeros(VISIBLE.size)
     purple[[90, 290]] = 1.0
     color = light_color(purple)
@@ -82,10 +62,8 @@ def test_distance_is_to_the_nearest_point_of_a_region() -> None:
 def test_the_command_ends_with_the_picture_or_exit_2(tmp_path: Path) -> None:
     path = csv(tmp_path, "wavelength_nm,R", WAVE, bell(600, 50) - 0.1)
     code, out, said = commanded("describe", path, "--output", tmp_path / "out")
-    assert code == 2
-    assert out.splitlines()[-1] == f"Picture: {tmp_path / 'out' / 'curves.png'}"
-    assert len(said.splitlines()) == 1
-    assert "negative value at 380 nm" in said
+    assert (code, said.count("\n"), "negative value at 380 nm" in said) == (2, 1, True)
+    assert str(tmp_path / "out" / "curves.png") in out
 
 
 @pytest.mark.parametrize(

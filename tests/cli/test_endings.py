@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
-import typer
 
 from sweep.base.errors import InfeasibleError
 from sweep.cli.endings import ends_in_lines
 
-from ..build import BASE
 from ..cases import thinned
-from ..commanded import UNDRAWN, commanded
+from ..commanded import commanded
 
 COMMAND = [sys.executable, "-m", "sweep"]
-SWEPT = BASE.split("constraints:", maxsplit=1)[0]
 
 
 @pytest.mark.parametrize(
@@ -27,11 +22,17 @@ SWEPT = BASE.split("constraints:", maxsplit=1)[0]
     [
         (["run"], "Missing argument"),
         (["run", "x.yaml", "--jobs", "0"], "--jobs"),
-        (["run", "x.yaml", "--jobs", "many"], "--jobs"),
         (["run", "x.yaml", "--job", "2"], "No such option"),
         (["chek", "x.yaml"], "No such command 'chek'"),
         (["check", "a.yaml", "b"], "unexpected extra argument"),
-        (["check", "nowhere.yaml"], "nowhere.yaml: cannot be read: No such file or directory"),
+        (["check", "nowhere.yaml"], "nowhere.yaml: cannot be read"),
+        (["check", "stopband", "--data", "nowhere"], "nowhere"),
+        (["check", "stopband", "--set", "seed"], "not KEY=VALUE"),
+        (["check", "stopband", "--set", "study.name=x"], "--set study.name=x: `study` is no mapping"),
+        (["check", "stopband", "--set", "cfas.7=RGGB"], "no such entry of the list"),
+        (["plan", "stopband", "--tolerance", "inf"], "tolerance"),
+        (["report", "nowhere"], "nowhere"),
+        (["audit", "nowhere"], "nowhere"),
     ],
 )
 def test_a_wrong_command_is_one_line(arguments: list[str], expected: str) -> None:
@@ -60,45 +61,14 @@ def test_a_stop_while_the_command_is_loaded_ends_it_without_a_word() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
-@pytest.mark.slow
-def test_a_command_that_is_done_leaves_no_worker_behind(tmp_path: Path) -> None:
-    study = tmp_path / "tiny.yaml"
-    study.write_text(SWEPT)
-    # As UNDRAWN, but by the door that users take.
-    program = UNDRAWN.replace("cli.app import main", "cli.start import start as main")
-    arguments = ["run", str(study), "--output", str(tmp_path), "--jobs", "2"]
-    command = [sys.executable, "-c", program, *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True) as run:
-        said, _ = run.communicate()
-    assert run.returncode == 0
-    assert said.splitlines()[-1] == str(tmp_path / "tiny")
-    until = time.monotonic() + 10
-    while (left := _of_session(run.pid)) and time.monotonic() < until:
-        time.sleep(0.05)
-    assert left == []
-
-
-def _of_session(session: int) -> list[int]:
-    """Processes of a session that are still there, but for those that nobody has waited for."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):
-            state, _, _, own = stat.read_text().rpartition(")")[2].split()[:4]
-            if int(own) == session and state != "Z":
-                found.append(int(stat.parent.name))
-    return found
-
-
 @pytest.mark.parametrize(
     ("error", "code", "expected"),
     [
         (MemoryError(), 2, "out of memory"),
         (OSError(28, "No space left on device", "/x/y"), 2, "/x/y: No space left on device"),
-        (RuntimeError("can't start new thread"), 2, "threads: can't start new thread"),
         (ImportError("libx.so: failed to map segment"), 2, "libx.so: failed to map segment"),
         (UnicodeEncodeError("utf-8", "a\udcff", 1, 2, "surrogates not allowed"), 2, "file name is not UTF-8"),
         (KeyboardInterrupt(), 130, "interrupted"),
-        (typer.Abort(), 130, "interrupted"),
         (InfeasibleError("out of\nreach"), 3, "out of reach"),
     ],
 )
@@ -115,11 +85,6 @@ def test_machine_errors_are_one_line(
     assert text.startswith("sweep: ")
     assert text.count("\n") == 1
     assert expected in text
-
-
-def test_a_fault_of_the_program_keeps_its_traceback() -> None:
-    with pytest.raises(ZeroDivisionError):
-        ends_in_lines(lambda: 1 / 0)
 
 
 def test_the_end_of_a_file_is_no_interrupt(tmp_path: Path) -> None:

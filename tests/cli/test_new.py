@@ -5,11 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from sweep.api.channels import channel_of, layout_of
-from sweep.api.new import new_study
 from sweep.api.study_text import scalar
 from sweep.base.errors import DataError, OutputError, StudyError
 from sweep.study import load_study
@@ -32,15 +30,6 @@ def leds(tmp_path: Path) -> Path:
     return csv(tmp_path, 'wavelength_nm,"royal, blue",gn,"yes",or,"rd: 1",dark', WAVE, *columns, name="leds.csv")
 
 
-def test_a_new_study_of_built_in_curves_loads_and_names_the_next_command(tmp_path: Path) -> None:
-    new_study("123", folder=tmp_path)
-    study = load_study(tmp_path / "123.yaml")
-    assert study.name == "123"
-    assert "RYNCy" in study.mosaics
-    assert study.search is not None
-    assert (tmp_path / "study.schema.json").is_file()
-
-
 def test_commented_keys_of_a_new_study_work(tmp_path: Path) -> None:
     path = made(tmp_path)
     text = path.read_text()
@@ -58,14 +47,8 @@ def test_files_fill_in_sensor_and_lights(tmp_path: Path, rgbw: Path, leds: Path)
     (sensor,), (lights,) = study.section.sensor.files, study.section.lights.files
     assert sensor.columns == {"R": "red", "G": "QE green", "B": "B", "C": "Clear"}
     assert (sensor.file, lights.file) == (rgbw.resolve().as_posix(), leds.resolve().as_posix())
-    elsewhere = tmp_path / "moved" / "study.yaml"
-    elsewhere.parent.mkdir()
-    elsewhere.write_text(path.read_text())
-    np.testing.assert_array_equal(load_study(elsewhere).lights.photons, study.lights.photons)
     assert sensor.scale == 0.01
     assert lights.signals == {"green": ["gn"], "yellow": ["yes"], "orange": ["or"], "red": ["rd: 1"]}
-    assert "# left out: royal, blue: xy" in path.read_text()
-    assert "# left out: dark: no visible light" in path.read_text()
     assert study.objective.column == "csd_yellow_red"
     (sweep_,) = study.section.sweeps.values()
     assert (sweep_.cfa, sweep_.base, sweep_.to) == ("RGBN", "C", "G")
@@ -82,27 +65,16 @@ def test_a_column_says_its_channel(column: str, channel: str | None) -> None:
     assert channel_of(column) == channel
 
 
-def test_exported_files_are_recognized(tmp_path: Path) -> None:
-    header = "wavelength_nm,QE Cy,N_over_Y,N,rR,cCy,yY,wC,xN,gG"
-    qe = csv(tmp_path, header, WAVE, *[0.5 * bell(460 + 20 * at, 45) for at in range(9)])
-    lines = new_study("mine", folder=tmp_path, qe=[qe]).lines
-    (sensor,) = load_study(tmp_path / "mine.yaml").section.sensor.files
-    assert sensor.columns == {"R": "rR", "G": "gG", "C": "wC", "Y": "yY", "Cy": "QE Cy"}
-    assert "Left out, see the file: N_over_Y, N, xN, cCy." in lines
-
-
 @pytest.mark.parametrize(
     ("channels", "changed", "base", "to"),
     [
         ("R G B W", "RGBN", "W", "G"),
         ("R G B", "RGNB", "G", "0.1"),
         ("R C", "RCCN", "C", "0.1"),
-        ("R B C", "RCNB", "C", "0.1"),
         ("R G Y Cy", "RYNCy", "Y", "G"),
         ("R Y Cy", "RYNCy", "Y", "0.1"),
         ("G Y", "YGGN", "G", "0.1"),
         ("C", "CCCN", "C", "0.1"),
-        ("B", "BBBN", "B", "0.1"),
     ],
 )
 def test_cfas_are_those_that_the_channels_allow(channels: str, changed: str, base: str, to: str) -> None:
@@ -129,21 +101,6 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     made(tmp_path, "second")
     assert (tmp_path / "studies" / "study.schema.json").read_text() == "old"
     assert not [p for p in (tmp_path / "studies").iterdir() if p.name.startswith(".")]
-
-
-def test_a_study_that_cannot_be_made_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> None:
-        raise OutputError("full")
-
-    monkeypatch.setattr("sweep.api.new.write_text", full)
-    with pytest.raises(OutputError, match="full"):
-        new_study("mine", folder=tmp_path / "a" / "b")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_the_next_command_can_be_pasted(tmp_path: Path) -> None:
-    lines = new_study("mine", folder=tmp_path / "my studies").lines
-    assert lines[-1] == f"Next: sweep run '{tmp_path / 'my studies' / 'mine.yaml'}'"
 
 
 @pytest.mark.parametrize("name", ["", "a/b", "../up", "mine.yaml", ".hidden", "-x", "a b", "\u00fc", "x" * 101])

@@ -20,8 +20,6 @@ def test_products_of_rows(k: int, m: int) -> None:
     exact = rows.astype(np.longdouble) @ matrix.astype(np.longdouble)
     assert (np.abs(whole - exact) <= k * np.finfo(float).eps * exact).all()
     np.testing.assert_array_equal(row_products(np.asfortranarray(rows), matrix), whole)
-    for at in range(len(rows)):
-        np.testing.assert_array_equal(row_products(rows[at : at + 1], matrix)[0], whole[at])
-    for n in (0, 2, 15, 16, 17, 40, 149):
+    for n in (0, 1, 2, 15, 16, 17, 40, 149):
         np.testing.assert_array_equal(row_products(rows[:n], matrix), whole[:n])
         np.testing.assert_array_equal(row_products(rows[1 : 1 + n : 2], matrix), whole[1 : 1 + n : 2])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import pytest
 
 from sweep.base.errors import FailedDesignError, InterruptedRunError, OutputError, SweepError
 from sweep.report import read_output
-from sweep.report.page import limits_of, summary_lines
+from sweep.report.page import limits_of
 from sweep.results.answers import ANSWERS
 from sweep.results.identity import CHUNK, run_facts
 from sweep.results.lock import locked
@@ -80,10 +79,7 @@ def test_failing_designs_stop_a_run_or_are_tried_again(fewer: Study, unharmed: p
         run_study(study, folder, 1, lambda *_: None, options=RunOptions(fail_fast=True))
     assert run_study(study, folder, 1, lambda *_: None)
     failed = (rows(folder)["status"] != "ok").sum()
-    output = read_output(folder)
-    told = f"Failed: {failed} rows, whose values are unknown here; status in results.parquet says why."
-    assert limits_of(output)[0] == told
-    assert told in summary_lines(output)
+    assert limits_of(read_output(folder))[0].startswith(f"Failed: {failed} rows")
     assert failed == 2 * 2 * 6 * 2  # in both scenes, every design of this edge
     assert not run_study(study, folder, 1, lambda *_: None)
     wish.unlink()
@@ -97,11 +93,13 @@ def test_status_and_dry_run_count_finished_designs(plain: Study, tmp_path: Path)
     with pytest.raises(OutputError, match="no run here"):
         status(folder)
     assert remaining_work(plain, folder).finished == 0
+    assert "Search: 4 starts, 200 evaluations at most." in remaining_work_lines(
+        remaining_work(load_study(study_file(tmp_path, 2)), folder), folder
+    )
     assert not folder.exists()
     half_done(plain, folder)
     done = len(rows(folder))  # readable while it runs
-    lines = status(folder).lines
-    assert lines[0].startswith(f"interrupted; the same command continues: {done:,} of {all_rows} designs")
+    assert f"{done:,} of {all_rows} designs" in status(folder).lines[0]
     assert remaining_work(plain, folder).finished == done
     with locked(folder):
         assert status(folder).lines[0].startswith("running")
@@ -110,25 +108,8 @@ def test_status_and_dry_run_count_finished_designs(plain: Study, tmp_path: Path)
     assert remaining_work(plain, folder).finished == plain.n_designs
 
 
-def test_dry_run_lists_the_work_and_runs_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = study_file(tmp_path, 2)
-    requested = "starts: 4, max_evaluations: 40, front: {min: 0.8, max: 0.9, count: 3}"
-    path.write_text(path.read_text().replace("starts: 4, max_evaluations: 200", requested))
-    monkeypatch.setattr("sweep.runs.sweep.run_job", None)
-    study = load_study(path)
-    found = remaining_work(study, tmp_path / "out")
-    _, about, search, front, *effects, _ = remaining_work_lines(found, tmp_path / "out")
-    assert re.fullmatch(r"Rows take about 1 s with 1 worker and 0\.\d+ MB, by a sample of \d+ rows here; .*", about)
-    assert search == "Search: 4 starts, 40 evaluations at most."
-    assert front == "Its front: 3 levels, 100 evaluations at most."  # two starts each, and one from each neighbor
-    told = {line.partition(": ")[2] for line in effects}
-    assert told == {f"{', '.join(plan.computed) or 'none'}." for plan in found.study.plans.values()}
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_changed_study_goes_beside_the_old_one(plain: Study, tmp_path: Path) -> None:
     base = tmp_path / "tiny"
-    assert output_folder(base, run_facts(plain)) == (base, None)
     ran(plain, base, 1)
     assert output_folder(base, run_facts(plain)) == (base, None)
     path = study_file(tmp_path)
@@ -142,8 +123,6 @@ def test_a_changed_study_goes_beside_the_old_one(plain: Study, tmp_path: Path) -
         ran(changed, base, 1)
     ran(changed, folder, 1)
     assert output_folder(base, run_facts(changed))[0] == folder
-    path.write_text(path.read_text().replace("0.003", "0.004"))
-    assert output_folder(base, run_facts(load_study(path)))[0] == tmp_path / "tiny-3"
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from joblib.externals.loky import get_reusable_executor
 
 from sweep.base.errors import StudyError
-from sweep.report import read_output, study_of
+from sweep.report import read_output
 from sweep.runs import run_study
 from sweep.study import Study, load_study
 
@@ -90,17 +90,11 @@ def test_a_family_and_a_metric_of_a_package_are_like_those_of_files(package: Pat
     pd.testing.assert_frame_equal(
         rows_in(tmp_path / "named").drop(columns="family"), rows_in(tmp_path / "files").drop(columns="family")
     )
-    kept = read_output(tmp_path / "named").provenance.data_sha256
-    assert sorted(kept) == [
-        "code of cfa-extras 1.2 (sweep.families: band)",
-        "code of cfa-extras 1.2 (sweep.metrics: spread)",
-    ]
     assert commanded("audit", tmp_path / "named")[0] == 2
     assert commanded("audit", tmp_path / "named", "--allow-code")[0] == 0
     (package / "filters.py").write_text(STOPBAND + "# other\n")
     code, _, said = commanded("audit", tmp_path / "named", "--allow-code")
-    assert code == 2
-    assert "not the code that the run had (got 'code of cfa-extras 1.2" in said
+    assert (code, "not the code that the run had" in said) == (2, True)
 
 
 @pytest.mark.usefixtures("package")
@@ -110,25 +104,8 @@ def test_no_code_of_a_package_runs_without_allow_code(tmp_path: Path) -> None:
     assert len(caught.value.issues) == 2  # the family and the metric
     assert commanded("run", tmp_path / "named.yaml")[0] == 2
     assert not (tmp_path / "ran").exists()
-    with pytest.raises(StudyError, match=r"unknown family \(got 'bands'\).*stopband, band; did you mean 'band'"):
-        study(tmp_path, STUDY.replace("family: band", "family: bands").replace("metrics: [spread]\n", ""))
-    assert not (tmp_path / "ran").exists()
     study(tmp_path)
     assert (tmp_path / "ran").exists()
-
-
-@pytest.mark.parametrize(
-    ("file", "text", "said"),
-    [
-        ("filters.py", "import nothing_like_it\n", "band cannot be loaded: ModuleNotFoundError"),
-        ("filters.py", "Bend = 1\n", "band cannot be loaded: AttributeError"),
-        ("metrics.py", "Spread = 3\n", "spread: TypeError: 'int' object is not callable"),
-    ],
-)
-def test_faults_of_a_package_are_lines(package: Path, tmp_path: Path, file: str, text: str, said: str) -> None:
-    (package / file).write_text(text)
-    with one_line(said):
-        study(tmp_path)
 
 
 def test_code_changed_after_loading_is_reported(package: Path, tmp_path: Path) -> None:
@@ -157,33 +134,23 @@ def test_curves_of_a_package_are_those_of_its_files(package: Path, tmp_path: Pat
     run_study(made, tmp_path / "packed", 1, lambda *_: None)
     kept = read_output(tmp_path / "packed").provenance
     assert {"qe.csv", "leds.csv", "code of cfa-extras 1.2 (sweep.sensors: mine)"} <= kept.data_sha256.keys()
-    again = study_of(read_output(tmp_path / "packed"), None, allow_code=True)  # with the curves that the run kept
-    np.testing.assert_array_equal(again.sensor.qe["Y"], made.sensor.qe["Y"])
-    with_own = PACKED.replace(
-        "sensor: mine", "sensor: {builtin: mine, files: [{file: qe.csv, columns: {W: R}}], clear: G}"
-    )
-    own = study(tmp_path, with_own).sensor
-    assert (own.clear, [*own.qe]) == ("G", ["R", "G", "B", "Y", "W"])
-    with pytest.raises(StudyError, match=r"lights: unknown built-in lights \(got 'leds2'\)"):
-        study(tmp_path, PACKED.replace("leds", "leds2"))
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("file", "text", "said"),
     [
-        (
-            CURVES.replace("SENSOR =", "SENSOR = 3 or"),
-            "mine says nothing of curves (got 3); allowed: a mapping with `files`",
-        ),
-        (CURVES.replace("columns", "column"), "no such section: files.0.columns: Field required (got 'mine')"),
-        (CURVES.replace("    return", "    return 1 / 0 or"), "leds: ZeroDivisionError: division by zero"),
-        (CURVES.replace("leds.csv", "led.csv"), "no such file (got 'led.csv')"),
+        ("filters.py", "import nothing_like_it\n", "band cannot be loaded: ModuleNotFoundError"),
+        ("filters.py", "Bend = 1\n", "band cannot be loaded: AttributeError"),
+        ("metrics.py", "Spread = 3\n", "spread: TypeError: 'int' object is not callable"),
+        ("curves.py", CURVES.replace("SENSOR =", "SENSOR = 3 or"), "mine says nothing of curves"),
+        ("curves.py", CURVES.replace("    return", "    return 1 / 0 or"), "leds: ZeroDivisionError"),
+        ("curves.py", CURVES.replace("leds.csv", "led.csv"), "no such file (got 'led.csv')"),
     ],
 )
-def test_faults_of_curves_of_a_package_are_lines(package: Path, tmp_path: Path, text: str, said: str) -> None:
-    (package / "curves.py").write_text(text)
+def test_faults_of_a_package_are_lines(package: Path, tmp_path: Path, file: str, text: str, said: str) -> None:
+    (package / file).write_text(text)
     with one_line(said):
-        study(tmp_path, PACKED)
+        study(tmp_path, PACKED if file == "curves.py" else STUDY)
 
 
 def test_two_packages_with_one_plugin_name_are_reported(package: Path, tmp_path: Path) -> None:

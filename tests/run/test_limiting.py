@@ -13,7 +13,6 @@ import pytest
 
 from sweep.camera.model import scene_model
 from sweep.metrics.limiting import limiting_lights
-from sweep.metrics.separation_kernels import nearest_pairs
 from sweep.results.designs import row_curves
 from sweep.results.tables import LIMITED_BY
 from sweep.study import Study
@@ -82,20 +81,3 @@ def test_lights_without_a_distance_limit_nothing(study: Study) -> None:
     model = scene_model(study.setup(study.spaces[-1], "chart"))
     nothing = model.read(np.zeros((1, 1, study.grid.size)))[0] * np.nan
     assert {lights[0] for lights in limiting_lights(model.setup, nothing).values()} == {None}
-
-
-BOUNDS = np.array([0, 2, 4])
-
-
-@pytest.mark.parametrize(
-    ("points", "nearest"),
-    [
-        ([[0.0], [9.0], [3.0], [12.0]], [0, 2]),  # 3 apart twice: the first pair
-        ([[0.0], [9.0], [12.0], [11.0]], [1, 3]),
-        ([[0.0], [np.inf], [5.0], [6.0]], [-1, -1]),
-    ],
-)
-def test_the_nearest_two_points(points: list[list[float]], nearest: list[int]) -> None:
-    found = np.empty((1, 1, 2), dtype=np.intp)
-    nearest_pairs(np.array(points)[None, None], np.arange(4), BOUNDS, found)
-    assert found[0, 0].tolist() == nearest

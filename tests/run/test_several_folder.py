@@ -1,30 +1,19 @@
-"""The folder of a study of several sensors is a run: it is continued, verified and repaired, and kills lose nothing of it.
-
-A small study of vision is killed in the same way.
-"""
+"""The folder of a study of several sensors is a run: it is continued, verified and repaired."""
 
 from __future__ import annotations
 
 import os
-import re
 import shutil
-import signal
-import tempfile
-import time
 from pathlib import Path
 
-import numpy as np
-import pyarrow.parquet as pq
 import pytest
 
-from sweep.results.answers import ANSWERS
 from sweep.results.dataset import part_name
 from sweep.results.manifest import Manifest
 from sweep.results.tables import ALL_SENSORS, MANIFEST, PROVENANCE, REPORT
 
 from ..commanded import commanded
 from ..conftest import draw_nothing
-from ..warm import Warm
 
 SEVERAL = """\
 study: few
@@ -38,25 +27,6 @@ constraints: {sensitivity: {min: 0.9}}
 search: {space: yellow, starts: 2, max_evaluations: 40}
 """
 PART = part_name(0)
-VISION = """\
-study: few
-sensor: ar0820
-lights: tl16
-pixel: {read_noise_e: 2, offset_dn: 168, well_e: 4000}
-cfas: [RGGB, RYYCy]
-vision:
-  fov_deg: 120
-  distances_m: [500]
-  levels: {day: {illuminance_lx: 40000, exposure_s: 2.0e-5, phantom_cd: 50}}
-  crop_px: 16
-  places_per_pixel: 1
-  prototypes: false
-  network: false
-  seeds: 2
-  train_images: 50
-  check_images: 50
-  test_images: 50
-"""
 
 pytestmark = pytest.mark.usefixtures("plain_pictures")
 
@@ -94,8 +64,7 @@ def test_a_finished_study_is_verified_and_not_computed_again(folder: Path, tmp_p
     assert "finished: 2 of 2 runs finished." in out
     assert f"ok: its {len(Manifest(folder).files)} files are as the run wrote them." in out
     before = contents(folder)
-    code, out, err = run(tmp_path, SEVERAL, "--quiet")
-    assert (code, out, err) == (0, f"{folder}\n", "")
+    assert run(tmp_path, SEVERAL, "--quiet") == (0, f"{folder}\n", "")
     assert contents(folder) == before
     assert {MANIFEST, PART, ALL_SENSORS, REPORT, PROVENANCE} <= {str(path) for path in before}
 
@@ -117,19 +86,13 @@ def test_damage_is_noticed_and_repaired(folder: Path, tmp_path: Path, name: str)
 
 def test_a_changed_study_goes_beside_with_its_own_filters(folder: Path, tmp_path: Path) -> None:
     before = contents(folder)
-    code, _, err = run(tmp_path, SEVERAL.replace("[570, 640]", "[570, 575]"))
-    assert (code, "no design" in err, list(folder.parent.iterdir())) == (
-        3,
-        True,
-        [folder],
-    )  # infeasible: nothing is left
+    code, _, _ = run(tmp_path, SEVERAL.replace("[570, 640]", "[570, 575]"))
+    assert (code, list(folder.parent.iterdir())) == (3, [folder])  # infeasible: nothing is left
     code, out, err = run(tmp_path, SEVERAL.replace("0.9", "0.85"))
     assert code == 0
     assert "holds another study of this name (changed" in err
     assert out.splitlines()[-1] == f"{folder}-2"
     assert contents(folder) == before
-    tables = [pq.read_table(place / ALL_SENSORS) for place in (folder, Path(f"{folder}-2"))]
-    assert not tables[0].equals(tables[1])
 
 
 @pytest.mark.parametrize("runs", [5, [["a"]]])
@@ -142,69 +105,18 @@ def test_forged_runs_are_one_line(tmp_path: Path, runs: object) -> None:
 def test_a_changed_value_names_the_folder_and_the_same_command_continues_it(tmp_path: Path) -> None:
     text = SEVERAL.replace("sensors: [ar0820, opencam]", "sensor: ar0820").split("boxes")[0].replace(", RYNCy", "")
     for bits in (8, 10, 8):
-        code, out, err = run(tmp_path, text, "--set", f"pixel.bits={bits}", "--set", "seed=2", "--quiet")
-        assert (code, out, err) == (0, f"{tmp_path}/out/few/pixel.bits={bits},seed=2\n", "")
+        found = run(tmp_path, text, "--set", f"pixel.bits={bits}", "--set", "seed=2", "--quiet")
+        assert found == (0, f"{tmp_path}/out/few/pixel.bits={bits},seed=2\n", "")
     assert sorted(path.name for path in (tmp_path / "out" / "few").iterdir()) == [
         f"pixel.bits={bits},seed=2" for bits in (10, 8)
     ]
-    code, out, _ = run(tmp_path, text, "--set", f"question=../{'x' * 300}")
-    (folder,) = [Path(line) for line in out.splitlines()[-1:]]
-    assert (code, folder.parent, len(folder.name)) == (0, tmp_path / "out" / "few", 129)
-
-
-def left_by(numbers: set[int]) -> list[str]:
-    """What joblib keeps in shared memory and temporary folders for some processes."""
-    places = [place for place in (Path("/dev/shm"), Path(tempfile.gettempdir())) if place.is_dir()]
-    names = [path.name for place in places for path in place.iterdir()]
-    found = [re.match(r"(?:sem\.loky-|joblib_memmapping_folder_)(\d+)[-_]", name) for name in names]
-    return [one[0] for one in found if one is not None and int(one[1]) in numbers]
-
-
-@pytest.mark.slow
-@pytest.mark.long
-@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups here")
-@pytest.mark.parametrize("text", [SEVERAL, VISION], ids=["several", "vision"])
-def test_kills_at_random_moments_lose_nothing(tmp_path: Path, text: str) -> None:
-    """Five kills of the process or of its whole group, each at a random moment of what is left to do."""
-    rng = np.random.default_rng(11)
-    (tmp_path / "few.yaml").write_text(text)
-
-    numbers = set[int]()
-
-    def begun(name: str) -> Warm:
-        made = Warm("run", tmp_path / "few.yaml", "--output", tmp_path / name, "--jobs", 2, said=tmp_path / "said")
-        numbers.add(made.pid)
-        return made
-
-    started_s = time.monotonic()
-    assert begun("undisturbed").wait(timeout=120) == 0, (tmp_path / "said").read_text()
-    whole_s, kills = time.monotonic() - started_s, 0
-    while kills < 5:
-        process = begun("out")
-        time.sleep(float(rng.uniform(0, whole_s)))
-        if process.poll() is None:
-            group = rng.random() < 0.5
-            (os.killpg if group else os.kill)(process.pid, signal.SIGKILL if group else signal.SIGTERM)
-            kills += 1
-        process.wait(timeout=60)
-        said = (tmp_path / "said").read_text()
-        assert "Traceback" not in said.partition("Exception ignored")[0], said
-        if (tmp_path / "out" / "few" / REPORT).exists():
-            shutil.rmtree(tmp_path / "out")
-    assert begun("out").wait(timeout=120) == 0, (tmp_path / "said").read_text()
-    for table in (tmp_path / "undisturbed").rglob("*.parquet"):
-        again = tmp_path / "out" / table.relative_to(tmp_path / "undisturbed")
-        assert pq.read_table(again).equals(pq.read_table(table)), table.name
-    assert not [*(tmp_path / "out").rglob(".tmp-*"), *(tmp_path / "out").rglob(ANSWERS)]
-    assert not left_by(numbers)
 
 
 def test_a_lost_run_is_made_again_alone(folder: Path, tmp_path: Path) -> None:
     before = contents(folder)
     shutil.rmtree(folder / "opencam_tl16")
     assert "opencam tl16: not run." in commanded("status", folder)[1]
-    code, _, err = commanded("audit", folder)
-    assert (code, "several sensors; allowed: one of ar0820_tl16" in err) == (2, True)
+    assert commanded("audit", folder)[0] == 2
     code, _, err = run(tmp_path)
     assert (code, err.count("nothing was computed")) == (0, 1)
     again = contents(folder)

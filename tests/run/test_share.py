@@ -11,7 +11,6 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
-from sweep.designs.tolerance import Tolerance
 from sweep.metrics.bound import Bound
 from sweep.metrics.drawn import rank_below
 from sweep.metrics.drawn_sensors import searched_sample
@@ -22,11 +21,10 @@ from sweep.runs.robustness import Candidate, drawn_dn
 from sweep.runs.rows import parts_of
 from sweep.search.gradients import Model
 from sweep.search.problem import Problem, SearchRun, starting_points
-from sweep.search.upper_bound import reason_without_bound, upper_bound_of
+from sweep.search.upper_bound import upper_bound_of
 from sweep.study import Search, Study, load_study
 
 from ..build import load, one_line, ran
-from ..cases import thinned
 from ..conftest import STUDIES
 from ..mischief import assert_same_tables
 
@@ -81,18 +79,6 @@ def test_yield_exceeds_the_true_value_in_at_most_a_twentieth_of_cases(draws: int
     assert chances[0] <= 0.05 < chances[1]
 
 
-@pytest.mark.parametrize("thickness", thinned([0.0, 0.004]))
-def test_its_derivative_is_exact(thickness: float) -> None:
-    model = Model(replace(problem(), tolerance=Tolerance(0.0, thickness)), SearchRun(0), 1000)
-    for u in starting_points(problem(), 2, 5)[: 2 if not thickness else 1]:
-        slopes = model.at(u).terms.by_u[0] / (2 * model.at(u).evaluation.objective)  # its terms are squares
-        for free, slope in enumerate(slopes):
-            step = np.zeros(u.size)
-            step[free] = 1e-6
-            above, below = (model.at(u + sign * step).evaluation.objective for sign in (1, -1))
-            assert (above - below) / 2e-6 == pytest.approx(slope, rel=1e-6, abs=1e-6 * np.abs(slopes).max())
-
-
 def test_jobs_are_small_where_each_design_sees_many_draws(tmp_path: Path) -> None:
     given = study(tmp_path)
     assert max(job.size for part in parts_of(given) for job in part.jobs) <= 32
@@ -127,20 +113,14 @@ def test_as_column_and_constraint_any_number_of_workers_gives_the_same(tmp_path:
     answer = filters[filters["kind"] == "search"].iloc[0]
     assert answer["feasible"]
     assert answer["yield_csd_yellow_red"] == pytest.approx(190.0, rel=1e-4)  # it binds: more light costs yield
-    assert reason_without_bound(problem()) == "yield_csd_yellow_red is not linear in the filter"
 
 
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        (
-            "wanted_yield: 0.99, ",
-            "",
-            "yield_csd_yellow_red needs `wanted_yield` of `population` or `uncertainty`; allowed: a share, such as 0.99",
-        ),
-        ("draws: 4000", "draws: 500", "wanted_yield 0.99 needs at least 1,000 `draws`, not 500"),
-        ("draws: 4000", "draws: 1000001", "wanted_yield takes at most 1,000,000 `draws`, not 1,000,001"),
-        ("wanted_yield: 0.99", "wanted_yield: 99", "population.wanted_yield"),
+        ("wanted_yield: 0.99, ", "", "yield_csd_yellow_red needs `wanted_yield`"),
+        ("draws: 4000", "draws: 500", "needs at least 1,000 `draws`"),
+        ("draws: 4000", "draws: 1000001", "takes at most 1,000,000 `draws`"),
     ],
 )
 def test_inconsistent_population_is_refused(tmp_path: Path, old: str, new: str, told: str) -> None:

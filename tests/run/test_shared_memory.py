@@ -37,23 +37,6 @@ def test_without_semaphores_threads_compute_the_same_rows(tmp_path: Path) -> Non
     assert_same_tables(tmp_path / "threads" / "tiny", tmp_path / "processes" / "tiny")
 
 
-QUIET = """
-from joblib.externals.loky.backend import resource_tracker
-from sweep.runs.workers import workers
-if __name__ == "__main__":
-    with workers(2) as pool:
-        assert list(pool([(abs, (-1,), {})])) == [1]
-    resource_tracker.register("/loky-1-gone", "semlock")
-"""
-
-
-@pytest.mark.slow
-def test_semaphores_that_a_stop_left_are_cleaned_up_without_a_word(tmp_path: Path) -> None:
-    (tmp_path / "quiet.py").write_text(QUIET)
-    done = subprocess.run([sys.executable, tmp_path / "quiet.py"], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-
-
 @pytest.mark.skipif(not os.access("/dev/shm", os.W_OK), reason="no shared memory here")
 def test_what_the_dead_left_in_shared_memory_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,15 +13,17 @@ from pathlib import Path
 
 import numpy as np
 import psutil
+import pyarrow.parquet as pq
 import pytest
 
+from sweep.results.answers import ANSWERS
 from sweep.results.dataset import rows_in
-from sweep.study import load_study
 
-from ..build import STUDY, ran
+from ..build import STUDY, load, ran
 from ..commanded import commanded
 from ..mischief import assert_same_tables
 from ..warm import Warm
+from .test_several_folder import SEVERAL
 
 SLOWED = Path(__file__).parent.parent / "slowed"
 SAID = "sweep: interrupted; finished parts are kept, the same command continues\n"
@@ -36,16 +39,31 @@ WITHIN_S = 15.0
 """The promise is five seconds on a machine that does nothing else."""
 
 
-def noisy_study(folder: Path) -> Path:
-    path = folder / "tiny.yaml"
-    text = (
-        STUDY.replace("COUNT", "5")
-        .replace("count: 51", "count: 7")
-        .replace("chart: {exposure: {kind: white_patch}}", "chart: {noise: true}")
-    )
-    text = text.replace("exposure_s: 0.002}}", "exposure_s: 0.002}, noise: true}")
-    path.write_text(text + "recognition: {states: [green, yellow, red]}\n")
-    return path
+NOISY = (
+    STUDY.replace("COUNT", "5")
+    .replace("count: 51", "count: 7")
+    .replace("chart: {exposure: {kind: white_patch}}", "chart: {noise: true}")
+    .replace("exposure_s: 0.002}}", "exposure_s: 0.002}, noise: true}")
+) + "recognition: {states: [green, yellow, red]}\n"
+VISION = """\
+study: few
+sensor: ar0820
+lights: tl16
+pixel: {read_noise_e: 2, offset_dn: 168, well_e: 4000}
+cfas: [RGGB, RYYCy]
+vision:
+  fov_deg: 120
+  distances_m: [500]
+  levels: {day: {illuminance_lx: 40000, exposure_s: 2.0e-5, phantom_cd: 50}}
+  crop_px: 16
+  places_per_pixel: 1
+  prototypes: false
+  network: false
+  seeds: 2
+  train_images: 50
+  check_images: 50
+  test_images: 50
+"""
 
 
 def command(folder: Path, *extra: str) -> list[str]:
@@ -65,26 +83,22 @@ def started(folder: Path, jobs: int, place: str, call: int) -> subprocess.Popen[
         )
 
 
-def wait_for(path: Path, run: subprocess.Popen[bytes] | Warm, folder: Path) -> None:
-    deadline = time.monotonic() + 120
-    while not path.exists():
-        assert run.poll() is None, (folder / "said").read_text()
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-
-
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("undisturbed")
-    ran(load_study(noisy_study(folder)), folder / "out" / "tiny", 1)
+    ran(load(folder, NOISY), folder / "out" / "tiny", 1)
     return folder / "out" / "tiny"
 
 
 def stopped(folder: Path, phase: str, jobs: int, number: signal.Signals) -> float:
     """Stop a run that is busy in a phase; the seconds until it has ended. Its workers have ended, too."""
-    noisy_study(folder)
+    (folder / "tiny.yaml").write_text(NOISY)
     run = started(folder, jobs, *PHASES[phase])
-    wait_for(folder / "slow.busy", run, folder)
+    deadline = time.monotonic() + 120
+    while not (folder / "slow.busy").exists():
+        assert run.poll() is None, (folder / "said").read_text()
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
     own = psutil.Process(run.pid).children(recursive=True)
     begun = time.monotonic()
     if number == signal.SIGINT:
@@ -98,15 +112,6 @@ def stopped(folder: Path, phase: str, jobs: int, number: signal.Signals) -> floa
     said = (folder / "said").read_text()
     assert [line for line in said.splitlines(keepends=True) if " left" not in line] == [SAID]  # but for progress
     return seconds
-
-
-def assert_continues(folder: Path, undisturbed: Path, jobs: int) -> None:
-    """The same command, in this process."""
-    code, _, said = commanded(*command(folder, "--jobs", str(jobs))[3:])
-    assert code == 0, said
-    names = ("results", "pareto", "designs", "search", "points", "curves")
-    assert_same_tables(folder / "out" / "tiny", undisturbed, *names)
-    assert not list((folder / "out").rglob(".tmp-*"))
 
 
 @pytest.mark.usefixtures("plain_pictures")
@@ -125,7 +130,11 @@ def test_a_stop_ends_every_phase(
     assert stopped(tmp_path, phase, jobs, number) < WITHIN_S
     if phase == "sweep" and jobs == 2:
         assert rows_in(tmp_path / "out" / "tiny")[0] > 0
-    assert_continues(tmp_path, undisturbed, jobs)
+    code, _, said = commanded(*command(tmp_path, "--jobs", str(jobs))[3:])  # the same command, in this process
+    assert code == 0, said
+    names = ("results", "pareto", "designs", "search", "points", "curves")
+    assert_same_tables(tmp_path / "out" / "tiny", undisturbed, *names)
+    assert not list((tmp_path / "out").rglob(".tmp-*"))
 
 
 def workers_of(mark: str) -> list[psutil.Process]:
@@ -138,24 +147,6 @@ def workers_of(mark: str) -> list[psutil.Process]:
     return found
 
 
-def begun(folder: Path, jobs: int) -> Warm:
-    """A run without pictures, which has said that it began; its workers bear the folder as a mark."""
-    run = Warm(*command(folder, "--jobs", str(jobs))[3:], said=folder / "said", SWEEP_MARK=str(folder))
-    wait_for(folder / "out" / "tiny" / "manifest.json", run, folder)
-    return run
-
-
-@pytest.fixture(scope="module")
-def whole_s(tmp_path_factory: pytest.TempPathFactory) -> float:
-    """Seconds that a run takes which nobody disturbs, once it has said that it began."""
-    folder = tmp_path_factory.mktemp("whole")
-    noisy_study(folder)
-    run = begun(folder, 2)
-    started_s = time.monotonic()
-    assert run.wait(timeout=120) == 0
-    return time.monotonic() - started_s
-
-
 def tracks_resources(process: psutil.Process) -> bool:
     try:
         return "resource_tracker" in " ".join(process.cmdline())
@@ -163,44 +154,61 @@ def tracks_resources(process: psutil.Process) -> bool:
         return True  # it has ended
 
 
-def emptied(folder: Path) -> None:
-    for made in sorted(folder.rglob("*"), reverse=True):
-        made.rmdir() if made.is_dir() else made.unlink()
-    folder.rmdir()
-
-
 @pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.parametrize("seed", range(2))
-def test_kills_in_every_phase(tmp_path: Path, undisturbed: Path, whole_s: float, seed: int) -> None:
-    """Parents and workers, by three signals, at random moments; the rows are those of an undisturbed run each time.
+@pytest.mark.parametrize(
+    ("text", "seed"),
+    [(NOISY, 0), (NOISY, 1), (SEVERAL, 0), (VISION, 0)],
+    ids=["plain", "plain again", "several", "vision"],
+)
+def test_kills_at_random_moments_lose_nothing(tmp_path: Path, text: str, seed: int) -> None:
+    """Processes, their groups and workers, by three signals; the rows are those of an undisturbed run each time.
 
-    Seven kills of each seed; a run that goes on may have another number of workers than the one that was killed.
+    Seven kills of each; a run that goes on may have another number of workers than the one that was killed.
     """
-    rng = np.random.default_rng([17, seed])
-    kills, out = {"run": 0, "worker": 0}, tmp_path / "out" / "tiny"
-    noisy_study(tmp_path)
-    while sum(kills.values()) < 7:
-        run = begun(tmp_path, 1 + int(rng.integers(2)))
+    rng, kills = np.random.default_rng([17, seed]), 0
+    (tmp_path / "tiny.yaml").write_text(text)
+
+    def begun(name: str, jobs: int) -> Warm:
+        """A run without pictures; its workers bear the folder as a mark."""
+        arguments = ("run", tmp_path / "tiny.yaml", "--output", tmp_path / name, "--jobs", jobs)
+        return Warm(*arguments, said=tmp_path / "said", SWEEP_MARK=str(tmp_path))
+
+    def assert_ended(run: Warm) -> int:
+        code = run.wait(timeout=120)
+        _, alive = psutil.wait_procs(workers_of(str(tmp_path)), timeout=WITHIN_S)
+        assert not alive
+        said = (tmp_path / "said").read_text()
+        assert "Traceback" not in said.partition("Exception ignored")[0], said  # in a library's callback
+        return code
+
+    def assert_same() -> None:
+        for table in (tmp_path / "undisturbed").rglob("*.parquet"):
+            again = tmp_path / "out" / table.relative_to(tmp_path / "undisturbed")
+            assert pq.read_table(again).equals(pq.read_table(table)), table.name
+
+    started_s = time.monotonic()
+    assert assert_ended(begun("undisturbed", 2)) == 0
+    whole_s = time.monotonic() - started_s
+    while kills < 7:
+        run = begun("out", 1 + int(rng.integers(2)))
         time.sleep(float(rng.uniform(0, whole_s)))
         number = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT][int(rng.integers(3))]
-        if rng.random() < 0.4 and run.poll() is None:
+        if rng.random() < 0.3 and run.poll() is None:
             children = psutil.Process(run.pid).children(recursive=True)
             # Without its tracker of resources, which is no worker, loky prints what that had to clean up.
             for process in [child for child in children if not tracks_resources(child)][-1:]:
                 process.kill()
-                kills["worker"] += 1
+                kills += 1
             time.sleep(float(rng.uniform(0, whole_s / 2)))
         if run.poll() is None:
-            os.kill(run.pid, number)
-            kills["run"] += 1
-        run.wait(timeout=120)
-        _, alive = psutil.wait_procs(workers_of(str(tmp_path)), timeout=WITHIN_S)
-        assert not alive
-        said_text = (tmp_path / "said").read_text()
-        assert "Traceback" not in said_text.partition("Exception ignored")[0], said_text  # in a library's callback
-        if (out / "report.html").exists():
-            assert_same_tables(out, undisturbed)
-            emptied(out)
-    assert_continues(tmp_path, undisturbed, 2)
+            (os.killpg if rng.random() < 0.3 else os.kill)(run.pid, number)
+            kills += 1
+        assert_ended(run)
+        if [*(tmp_path / "out").glob("*/report.html")]:
+            assert_same()
+            shutil.rmtree(tmp_path / "out")
+    assert assert_ended(begun("out", 2)) == 0
+    assert_same()
+    assert not [*(tmp_path / "out").rglob(".tmp-*"), *(tmp_path / "out").rglob(ANSWERS)]

@@ -13,7 +13,7 @@ from sweep.camera.curve_errors import CurveErrors, linear_in_filter
 from sweep.camera.linear import linear_model
 from sweep.designs.tolerance import NONE
 from sweep.metrics.drawn import draws_of
-from sweep.metrics.drawn_sensors import RandomSensors, searched_sample
+from sweep.metrics.drawn_sensors import RandomSensors
 from sweep.metrics.members import population_model
 from sweep.results.output import read_output
 from sweep.search.gradients import Model
@@ -22,7 +22,7 @@ from sweep.search.solver import search_from, smooth_objective
 from sweep.study import Study
 
 from ..build import load, one_line, ran
-from .test_sensors import MEASURED, own_csd, own_draws
+from .test_sensors import own_csd, own_draws
 
 PAIR = ("yellow", "red")
 TEXT = """\
@@ -70,7 +70,6 @@ def test_a_yield_of_random_sensors_is_that_of_own_draws(tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
     parts = [own_draws(["R", "Y", "Cy"], 2000, errors, rng) for _ in range(10)]
     own = np.concatenate([own_csd(part, np.array([1.0, 2, 1]))[0] for part in parts])
-    assert MEASURED.is_dir()
     assert 0.9 <= (own >= found).mean() <= 0.925
     assert judged["draws"] == 20_000
     assert judged["dn_low"] <= judged["dn"] <= judged["dn_high"]
@@ -113,31 +112,25 @@ def test_every_draw_is_read_as_a_camera_of_its_curves(tmp_path: Path, more: str,
         assert found[draw] == pytest.approx(own, rel=1e-9)
 
 
-@pytest.mark.parametrize("more", ["", LAMPS])
+@pytest.mark.parametrize("more", ["", LAMPS, LAMPS.replace("{edge_shift_nm: 2}", "{thickness: 0.004}")])
 @pytest.mark.parametrize("tile", ["RYNCy", "RNNB"])
 def test_derivatives_are_those_of_differences(tmp_path: Path, more: str, tile: str) -> None:
     problem = problem_of(load(tmp_path, TEXT.replace("RYNCy", tile) + more))
     point = Model(problem, SearchRun(0), 10).at(u := problem.to_unit(X))
     step = 1e-6
+    slopes = point.terms.by_u[0] / (2 * point.evaluation.objective)  # its terms are squares
     for at in range(u.size):
         values = [
             smooth_objective(problem, problem.from_unit(u + sign * step * np.eye(u.size)[at])) for sign in (1, -1)
         ]
-        slope = point.terms.by_u[0, at] / (2 * point.evaluation.objective)
-        assert slope == pytest.approx((values[0] - values[1]) / (2 * step), rel=1e-4, abs=1e-2)
+        measured = (values[0] - values[1]) / (2 * step)
+        assert slopes[at] == pytest.approx(measured, rel=1e-6, abs=1e-6 * np.abs(slopes).max())
 
 
 @pytest.mark.slow
-def test_a_search_over_random_cameras_beats_the_exact_one_on_others(tmp_path: Path) -> None:
-    """On 100,000 other cameras the intervals are apart; differential evolution finds no more than 1 % above."""
-    text = TEXT.replace("draws: 1000", "draws: 10000") + LAMPS
-    study = load(tmp_path, text)
-    ran(study, tmp_path / "out", 2)
-    judged = pd.read_parquet(tmp_path / "out" / "yields.parquet").set_index("name")
-    best = judged.loc["best stopband"]
-    assert best["draws"] == 100_000
-    assert best["dn_low"] > 1.05 * judged.loc["exact", "dn_high"]
-    problem = problem_of(load(tmp_path, text.replace("draws: 10000", "draws: 1000")))
+def test_differential_evolution_finds_no_more_than_a_search_over_random_cameras(tmp_path: Path) -> None:
+    """But for 1 %."""
+    problem = problem_of(load(tmp_path, TEXT + LAMPS))
     model = Model(problem, SearchRun(0), 10**6)
     ours = max(
         e.objective
@@ -173,31 +166,16 @@ def test_every_yield_that_is_asked_for_is_judged(tmp_path: Path) -> None:
     assert set(judged["draws"]) == {2000}
 
 
-def test_fresh_cameras_are_others(tmp_path: Path) -> None:
-    problem = problem_of(load(tmp_path, TEXT))
-    curves = problem.family.curves(X[None])
-    searched = searched_sample(problem.setup, problem.tolerance, 1).distances(curves, [PAIR])[PAIR]
-    again = searched_sample(problem.setup, problem.tolerance, 1).distances(curves, [PAIR])[PAIR]
-    other = RandomSensors(problem.setup, problem.tolerance, (1, 1, 0)).distances(curves, [PAIR])[PAIR]
-    np.testing.assert_array_equal(searched, again)
-    assert not np.isin(other, searched).any()
-
-
 @pytest.mark.parametrize(
     ("old", "new", "line"),
     [
-        ("draws: 1000", "draws: 30000", "wanted_yield takes at most 20,000 `draws`, not 30,000"),
-        ("draws: 1000", "draws: 100", "wanted_yield 0.95 needs at least 200 `draws`, not 100"),
-        (", wanted_yield: 0.95", "", "yield_csd_yellow_red needs `wanted_yield` of `population` or `uncertainty`"),
-        (
-            "objective:",
-            "population: {binning_nm: 2, wanted_yield: 0.99}\nobjective:",
-            "stated of `population`, too; of `uncertainty` it counts random curves and random lamps (got 0.95)",
-        ),
+        ("draws: 1000", "draws: 30000", "takes at most 20,000 `draws`"),
+        ("draws: 1000", "draws: 100", "needs at least 200 `draws`"),
+        ("objective:", "population: {binning_nm: 2, wanted_yield: 0.99}\nobjective:", "stated of `population`, too"),
         (
             TEXT[TEXT.index("boxes:") :],
             "scenarios: {night: {drive: {duty: 0.5, frequency_hz: 90}}}\n",
-            "random cameras under a pulsed light need a fixed exposure (scenario night)",
+            "need a fixed exposure (scenario night)",
         ),
     ],
 )
