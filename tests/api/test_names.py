@@ -20,11 +20,6 @@ def test_every_name_is_there_and_documented() -> None:
         assert getattr(sweep, name).__doc__
 
 
-def test_an_unknown_name_is_no_attribute() -> None:
-    with pytest.raises(AttributeError, match="no attribute 'load_studies'"):
-        sweep.load_studies  # noqa: B018
-
-
 def test_stub_file_types_the_public_names() -> None:
     """The stub imports each name from where the package takes it."""
     stub = ast.parse((ROOT / "sweep" / "__init__.pyi").read_text())

@@ -69,4 +69,3 @@ def test_a_study_made_in_python_runs_and_is_read_again(tmp_path: Path) -> None:
     )
     again = sweep.read_run(run.folder)
     pd.testing.assert_frame_equal(again.study.evaluate(), study.evaluate())
-    pd.testing.assert_series_equal(again.curves["sensor"]["N"], study.curve("N"))

@@ -27,10 +27,6 @@ def small(folder: Path, name: str, after: str = "") -> Path:
     return path
 
 
-def test_the_version() -> None:
-    assert commanded("--version") == (0, f"sweep {sweep.__version__}\n", "")
-
-
 def test_a_name_is_a_study_of_this_folder_or_of_the_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert shipped_folder() == STUDIES
     monkeypatch.chdir(tmp_path)

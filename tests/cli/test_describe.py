@@ -15,7 +15,6 @@ from sweep.spectra.signal_color import VISIBLE, light_color, outline
 from sweep.study.editors import schema_text
 
 from ..commanded import commanded
-from ..conftest import MEASURED, SHARED, needs_measured
 from ..curve_texts import WAVE, bell, csv
 
 
@@ -64,21 +63,6 @@ def test_the_command_ends_with_the_picture_or_exit_2(tmp_path: Path) -> None:
     code, out, said = commanded("describe", path, "--output", tmp_path / "out")
     assert (code, said.count("\n"), "negative value at 380 nm" in said) == (2, 1, True)
     assert str(tmp_path / "out" / "curves.png") in out
-
-
-@pytest.mark.parametrize(
-    ("file", "guess"),
-    [
-        (MEASURED / "qe_ar0132at_rgbw.csv", "QE"),
-        (MEASURED / "led_luxeon.csv", "light"),
-        pytest.param(SHARED / "data" / "qe_mt9v024_rccc.csv", "QE", marks=needs_measured),
-        pytest.param(SHARED / "data" / "traffic_lica.csv", "light", marks=needs_measured),
-    ],
-)
-def test_measured_files_are_recognized(tmp_path: Path, file: Path, guess: str) -> None:
-    found = describe(file, output=tmp_path)
-    assert any(f"A guess: {guess}" in line for line in found.lines)
-    assert found.problem is None
 
 
 def test_a_picture_of_another_stays(tmp_path: Path) -> None:

@@ -66,7 +66,6 @@ def test_a_stop_while_the_command_is_loaded_ends_it_without_a_word() -> None:
     [
         (MemoryError(), 2, "out of memory"),
         (OSError(28, "No space left on device", "/x/y"), 2, "/x/y: No space left on device"),
-        (ImportError("libx.so: failed to map segment"), 2, "libx.so: failed to map segment"),
         (UnicodeEncodeError("utf-8", "a\udcff", 1, 2, "surrogates not allowed"), 2, "file name is not UTF-8"),
         (KeyboardInterrupt(), 130, "interrupted"),
         (InfeasibleError("out of\nreach"), 3, "out of reach"),

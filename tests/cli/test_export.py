@@ -16,7 +16,7 @@ from sweep.base.errors import OutputError, SweepError
 from sweep.report.export import export, relative_transmission
 from sweep.results.dataset import part_paths
 from sweep.runs.audit import audit
-from sweep.spectra.filter_files import color_hints, csv_text, isetcam_mat, unique_names
+from sweep.spectra.filter_files import color_hints, csv_text, unique_names
 from sweep.spectra.formats import read_curves
 from sweep.study import load_study
 
@@ -191,6 +191,3 @@ def test_names_that_a_file_cannot_hold_are_made_so(tmp_path: Path) -> None:
     assert list(read.values) == unique_names(names) == ['a "b", c', "a b", "a b_2", "wavelength_nm_2", "_", "blå"]
     for found, made in zip(read.values.values(), curves.values(), strict=True):
         np.testing.assert_array_equal(found, made)
-    hints = color_hints(names, {})
-    (tmp_path / "x.mat").write_bytes(isetcam_mat(wave, curves, hints, np.array([[0, 1], [2, 5]]), "x"))
-    assert [name[1:] for name in read_curves(tmp_path / "x.mat").values] == unique_names(names)

@@ -115,14 +115,10 @@ def test_a_bad_name_is_refused(tmp_path: Path, name: str) -> None:
     "text",
     [
         *(
-            "R",
             "yes",
             "1e5",
-            "null",
             "a, b",
-            "[x]",
             "it's",
-            "# no",
             "a: b",
             '"',
             "\u4fe1",

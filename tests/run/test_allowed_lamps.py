@@ -69,11 +69,8 @@ def test_a_map_is_that_of_every_pair_read_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("requested", "said"),
     [
-        ("regions: {}", "wanted_dn"),
-        ("regions: {wanted_dn: 100, norms: [en_12369]}", "en_12368"),
         ("regions: {wanted_dn: 100, norms: [ite, ite]}", "named twice"),
         ("regions: {wanted_dn: 100, peak_nm: [660, 560]}", "660 must not be above 560"),
-        ("regions: {wanted_dn: 100, peak_nm: 600}", "two numbers, from and to"),
         ("regions: {wanted_dn: 100, peak_step_nm: 0.1, fwhm_step_nm: 0.1}", "too many"),
         ("regions: {wanted_dn: 100, peak_nm: [560, 750]}", "peaks outside the study's wavelengths"),
         ("regions: {wanted_dn: 100, peak_nm: [610, 660]}", "is yellow as en_12368 allows it"),

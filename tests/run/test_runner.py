@@ -49,9 +49,7 @@ def test_rows_stand_in_order_with_their_columns(output: Path) -> None:
     assert "pareto" not in frame.columns
     for name in ("pareto.parquet", "designs.parquet"):
         assert {*frame.columns, "chromatic_csd_orange_red", "pareto"} <= {*pd.read_parquet(output / name)}
-    assert set(frame["status"]) == {"ok"}
     assert list(frame["kind"].iloc[[0, 1, 2, 3, -1]]) == ["reference", "reference", "design", "sweep", "search"]
-    assert frame["sensitivity"].isna().sum() == 4  # two plain CFAs in two scenarios
 
 
 def test_front_is_not_dominated(study: Study, output: Path) -> None:

@@ -17,7 +17,6 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.results.answers import ANSWERS
-from sweep.results.dataset import rows_in
 
 from ..build import STUDY, load, ran
 from ..commanded import commanded
@@ -128,8 +127,6 @@ def test_a_stop_ends_every_phase(
     tmp_path: Path, undisturbed: Path, phase: str, jobs: int, number: signal.Signals
 ) -> None:
     assert stopped(tmp_path, phase, jobs, number) < WITHIN_S
-    if phase == "sweep" and jobs == 2:
-        assert rows_in(tmp_path / "out" / "tiny")[0] > 0
     code, _, said = commanded(*command(tmp_path, "--jobs", str(jobs))[3:])  # the same command, in this process
     assert code == 0, said
     names = ("results", "pareto", "designs", "search", "points", "curves")
