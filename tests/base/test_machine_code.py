@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import os
-import pickle
 import shutil
 import stat
 import subprocess
@@ -12,11 +11,9 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import numpy as np
 import pytest
-from numba.core import caching
 
 import sweep
 from sweep.base import machine_code
@@ -96,18 +93,6 @@ def test_damaged_machine_code_is_compiled_anew(folder: Path, suffix: str, damage
     file.write_bytes(DAMAGES[damage](file.read_bytes()))
     again, after = kernel(), kernel()
     assert [again(1.0), hits(again), after(1.0), hits(after)] == [3.0, 0, 3.0, 1]
-
-
-@pytest.mark.parametrize("error", [EOFError, pickle.UnpicklingError, RuntimeError("LLVM"), MemoryError])
-def test_machine_code_that_cannot_be_loaded_is_compiled_anew(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
-) -> None:
-    assert folder.exists()
-    with monkeypatch.context() as broken:
-        broken.setattr(caching.CompileResultCacheImpl, "rebuild", mock.Mock(side_effect=error))
-        assert kernel()(1.0) == 3.0
-    after = kernel()
-    assert [after(1.0), hits(after)] == [3.0, 1]
 
 
 def test_machine_code_of_another_signature_is_not_run(folder: Path) -> None:
