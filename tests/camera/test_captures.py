@@ -16,7 +16,7 @@ from sweep.camera.captures import NAMED_CAPTURES, Capture
 from sweep.camera.model import scene_model
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise import errors as confusion
-from sweep.camera.noise.merge import coded, limits_dn, merged, without_noise
+from sweep.camera.noise.merge import coded, limits_dn, merged
 from sweep.camera.pixel import Pixel
 from sweep.camera.pwm import exposure_scales, light_in, phases_of
 from sweep.camera.scene import FixedExposure, PwmDrive, Scene
@@ -169,19 +169,6 @@ def test_errors_are_those_of_all_outcomes(seed: int) -> None:
     error = sum(min(one.get(v, 0.0), other.get(v, 0.0)) for v in one | other) / 2
     assert sum(one.values()) == pytest.approx(1, abs=1e-9)
     assert found.error["one", "other"][0] == pytest.approx(error, rel=0.02)
-
-
-def test_the_rule_of_saturation_is_that_of_isetcam() -> None:
-    """ISETCam, sensorComputeArray: the first of LPD-HCG and SPD where it has at most 95 % of its swing, else the other."""
-    captures = [{"well_e": 22_000.0 * 49 / 200, "bits": 24}, {"sensitivity": 0.01, "well_e": 7_900.0, "bits": 24}]
-    pixel = Pixel(captures=captures, threshold=0.95)
-    light = relative_light(pixel)
-    electrons = np.geomspace(1, 1e6, 4001)
-    large, small = np.minimum(electrons, 22_000.0 * 49 / 200), np.minimum(electrons * 0.01, 7_900.0)
-    expected = np.where(large > 0.95 * 22_000.0 * 49 / 200, small / 0.01, large)
-    found = without_noise(light[:, None] * electrons, light[:, None], pixel) / pixel.dn_per_e
-    half_a_step_e = 0.5 * 7_900.0 / 2**24 / 0.01
-    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=half_a_step_e)
 
 
 def test_codes_of_companding_add_their_steps() -> None:

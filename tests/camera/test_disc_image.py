@@ -94,7 +94,6 @@ def test_images_are_made_at_every_step_and_at_the_end() -> None:
 @pytest.mark.parametrize(
     ("distance_m", "diameter_m", "optics", "place"),
     [
-        (5.0, 0.2, Optics(), ("target",)),
         (0.01, 1e-4, Optics(), ("target", "distance_m")),
         (20.0, 0.2, Optics(focus_m=0.01), ("optics", "focus_m")),
         (20.0, 0.2, Optics(focus_m=0.1, f_number=0.5), ("optics", "focus_m")),
@@ -106,15 +105,3 @@ def test_an_image_that_is_too_much_is_named(
     target = Target(distance_m=distance_m, diameter_m=diameter_m, fov_deg=60.0)
     result = psf.image_fault(Scene(target=target, optics=optics), Pixel())
     assert (None if result is None else result.path) == place
-
-
-def test_pixels_of_a_lattice_are_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All CFAs whose tiles are of one size ask for them."""
-    calls, means = [], psf.DiscProfile.pixel_means
-    monkeypatch.setattr(psf.DiscProfile, "pixel_means", lambda *of: calls.append(1) or means(*of))  # type: ignore[func-returns-value]
-    lattice = window_around([(x / 16, y / 16) for x in range(16) for y in range(16)], 2)
-    wanted = np.hypot(lattice.dx, lattice.dy) < 2.5
-    profile = psf.DiscProfile(2.1, 15.0, _VISIBLE_UM, 4.0, 0.0)
-    first, again = (light_on_pixels(lattice, wanted, 0.5, 1.0, profile, 2.1) for _ in range(2))
-    np.testing.assert_array_equal(first.values, again.values)
-    assert len(calls) == 1

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-import mpmath as mp
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,12 +15,10 @@ from scipy.special import j0, j1
 
 from sweep.camera import irradiance, psf, pwm, sampling
 from sweep.camera.linear import linear_model
-from sweep.camera.noise import gaussian
-from sweep.camera.phases import scene_phases
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import FixedExposure, PwmDrive, Scene, Target
 from sweep.spectra.color import luminance_per_photon_radiance
-from sweep.spectra.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid, linear_basis
+from sweep.spectra.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid
 
 from ..hard.scenes import FAR, NEAR, TILES, scene, target
 
@@ -60,21 +57,6 @@ def test_the_transfer_function_out_of_focus_is_the_autocorrelation_of_the_pupil(
     exact = quad(overlap, 0, max(0.0, 1 - share), epsabs=1e-10, limit=200)[0]
     found = psf.otf(np.array([share / 1.1]), np.array([0.55]), 2.0, 0.7)[0, 0]
     assert found == pytest.approx(exact, abs=1e-8)
-
-
-@pytest.mark.parametrize(("f_number", "w20_um"), [(1.4, 0.0), (2.0, 0.0), (8.0, 0.0), (2.0, 0.3)])
-def test_images_at_ten_nanometers_tell_those_between(f_number: float, w20_um: float) -> None:
-    """A line between neighbors is off by at most h^2 / 8 times the second derivative, which a finer grid gives."""
-    fine = np.linspace(0.4, 0.7, 601)
-    for radius in (1.0, 6.2, 18.9):
-        r_um = np.linspace(0, 1.6 * radius, 60)
-        exact = psf.DiscProfile(radius, 1.6 * radius, fine, f_number, w20_um).at(r_um)
-        bend = np.abs(np.diff(exact, 2, axis=1)).max() / (fine[1] - fine[0]) ** 2
-        knots_nm = psf.psf_knots_nm(fine * 1e3, 10.0)
-        at_knots = psf.DiscProfile(radius, 1.6 * radius, knots_nm * 1e-3, f_number, w20_um).at(r_um)
-        error = np.abs(at_knots @ linear_basis(fine * 1e3, knots_nm) - exact).max()
-        assert error <= 0.01**2 / 8 * bend * (1 + 1e-6) + 1e-6
-        assert error < 5e-3
 
 
 @pytest.mark.parametrize("name", list(TILES))
@@ -150,31 +132,10 @@ def test_luminance_of_a_traffic_light() -> None:
     assert per_photon == pytest.approx(683.002 * PLANCK_J_S * LIGHT_M_S / 555e-9, rel=1e-4)
 
 
-@pytest.mark.parametrize("sigma", [0.0, 0.05, 0.2, 0.49, 0.51, 2.0])
-def test_dithering_by_the_steps_passed(sigma: float) -> None:
-    for x in (0.0, 0.2, 0.45, 0.7, 17.33):
-        with mp.workdps(30):
-            if sigma == 0:
-                exact = mp.floor(x + 0.5)
-            else:
-                exact = sum(
-                    k * (mp.ncdf((k + 0.5 - x) / sigma) - mp.ncdf((k - 0.5 - x) / sigma)) for k in range(-20, 60)
-                )
-        found = x + gaussian.rounding(np.array([x]), np.array([sigma]))[0][0]
-        assert found == pytest.approx(float(exact), abs=1e-9)
-
-
 def test_saturation_ends_at_the_first_of_well_and_adc() -> None:
     assert Pixel().saturation_e == pytest.approx(10_000)
     assert Pixel(gain_dn_per_e=0.5, offset_dn=95.0).saturation_e == pytest.approx(8000)
     assert Pixel(gain_dn_per_e=0.1).saturation_e == pytest.approx(10_000)
-
-
-def test_a_phase_counts_within_the_tile() -> None:
-    one, other = (
-        scene("a", "RGGB", {"target": FAR | {"phase_px": p}}).setup for p in ([0.25, 1.5], [1e6 + 0.25, -0.5])
-    )
-    np.testing.assert_allclose(scene_phases(one).center_px, scene_phases(other).center_px, atol=1e-9)
 
 
 def test_focal_length_gives_the_pixels_per_radian() -> None:

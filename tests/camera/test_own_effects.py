@@ -25,20 +25,17 @@ def own_effect(body: str) -> UserEffect:
     return UserEffect(UserCode("my.py:effect", source))
 
 
-def test_effects_are_applied_in_order() -> None:
+def test_effects_are_applied_in_order_and_see_their_scene() -> None:
     setup = scene("lit", "RGGB", LIT).setup
     halved = own_effect("return replace(irradiance, signals=irradiance.signals / 2)")
-    added = own_effect("return replace(irradiance, signals=irradiance.signals + irradiance.background)")
+    added = own_effect(
+        "return replace(irradiance, signals=irradiance.signals + scene.target.distance_m * irradiance.background)"
+    )
     seen = scene_irradiance(replace(setup, user_effects=(halved, added)))
-    np.testing.assert_allclose(seen.signals, signal_irradiance(setup) / 2 + background_irradiance(setup), rtol=1e-14)
+    np.testing.assert_allclose(
+        seen.signals, signal_irradiance(setup) / 2 + 50 * background_irradiance(setup), rtol=1e-14
+    )
     np.testing.assert_array_equal(seen.background, background_irradiance(setup))
-
-
-def test_an_effect_sees_its_scene() -> None:
-    setup = scene("lit", "RGGB", LIT).setup
-    nearer = own_effect("return replace(irradiance, signals=irradiance.signals * scene.target.distance_m)")
-    seen = signal_irradiance(replace(setup, user_effects=(nearer,)))
-    np.testing.assert_allclose(seen, 50 * signal_irradiance(setup), rtol=1e-14)
 
 
 @pytest.mark.parametrize(

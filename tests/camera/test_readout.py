@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sweep.camera.effects import _steepness
 from sweep.camera.model import SceneModel
 from sweep.camera.noise import moments, table
 from sweep.camera.pixel import Pixel
@@ -13,7 +12,6 @@ from sweep.camera.pixel import Pixel
 from .. import readout_oracle
 from ..cases import thinned
 from ..hard.scenes import scene
-from .one_pixel import readout_bound_dn
 
 
 def random_pixel(seed: int) -> tuple[Pixel, list[float]]:
@@ -57,17 +55,6 @@ def test_prnu_spreads_the_gains_of_poisson_electrons(read: float, gain: float, o
     pixel = Pixel(well_e=800, gain_dn_per_e=gain, read_noise_e=read, offset_dn=offset, prnu=0.01)
     for electrons in (0.5, 30.0, 700.0, 820.0):
         check(pixel, electrons)
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_rounding_under_noise_is_within_its_bound(seed: int) -> None:
-    pixel, _ = random_pixel(seed + 300)
-    brightest = 1.2 * moments.LinearRange.of(pixel).full_e + 50
-    electrons = np.linspace(0, np.sqrt(brightest), 7001) ** 2
-    shift = table.mean_rounded(electrons, pixel) - table.mean_unrounded(electrons, pixel)
-    assert np.ptp(shift) <= readout_bound_dn("quantization", pixel, brightest) + 1e-9
-    steepest = (np.diff(table.mean_rounded(electrons, pixel)) / np.diff(electrons * pixel.dn_per_e)).max()
-    assert steepest <= _steepness(pixel.dn_per_e * pixel.read_noise_e) * (1 + 1e-6) + 1e-6
 
 
 def test_a_whole_pedestal_cancels_to_the_last_digit() -> None:
