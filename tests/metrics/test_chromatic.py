@@ -12,18 +12,14 @@ from sweep.camera.linear import linear_model
 from sweep.camera.setup import Setup
 from sweep.metrics.bound import FEASIBLE
 from sweep.metrics.chromatic import (
-    chromatic_along,
     chromatic_separation,
     chromatic_separations,
     squared_distance,
 )
-from sweep.metrics.smooth import SmoothDesign
 from sweep.search.problem import best_feasible, starting_points
 from sweep.search.solver import search_from
 from sweep.search.upper_bound import upper_bound_of
 from sweep.study.load import load_study
-
-from ..hard.scenes import FAMILY, scene
 
 STUDIES = Path(__file__).parents[2] / "studies"
 PAIR = ("yellow", "red")
@@ -63,31 +59,6 @@ def test_an_unknown_response_has_an_unknown_distance() -> None:
     distances = chromatic_separation(response, np.array([0]), np.array([1]))
     assert np.isnan(distances[0])
     assert distances[1] == 0.0
-
-
-def test_derivative_equals_that_of_the_rejection_by_complex_step() -> None:
-    """|y1|^2 - (y1 y2)^2 / |y2|^2 of the responses to complex filters; the smaller of both orders."""
-    setup = scene("chart", "RYNCy", {"background_cd_m2": 100.0}).setup
-    model, x, span = (
-        linear_model(setup),
-        np.array([612.0, 8.0, 645.0, 9.0, 0.9]),
-        np.array([30.0, 10.0, 30.0, 10.0, 0.5]),
-    )
-    design = SmoothDesign(model, FAMILY, x, np.arange(5), span)
-    y, by_u = design.lamps
-    members = setup.members
-    from sweep.metrics.chromatic import chromatic_rows
-
-    rows = chromatic_rows(design, pairs=(PAIR,), noise=False)
-    for at in range(5):
-        along = y[0] + 1j * 1e-30 * by_u[at, 0]
-        a, b = along[members["yellow"]][:, None], along[members["red"]][None]
-        dot = (a * b).sum(axis=-1)
-        orders = [((u**2).sum(axis=-1) - dot**2 / (v**2).sum(axis=-1)) for u, v in ((b, a), (a, b))]
-        expected = np.concatenate([order.ravel() for order in orders])
-        np.testing.assert_allclose(rows.values, expected.real, rtol=1e-9)
-        slope = expected.imag / 1e-30
-        np.testing.assert_allclose(rows.by_u[:, at], slope, rtol=1e-7, atol=1e-9 * np.abs(slope).max())
 
 
 def test_no_filter_exceeds_the_upper_bound() -> None:
@@ -134,23 +105,3 @@ def test_lamps_of_different_photons_are_judged_without_brightness(tmp_path: Path
     study = load_study(tmp_path / "a.yaml", changes=changes)
     assert (study.objective.column, study.warnings) == ("chromatic_csd_yellow_red", ())
     assert load_study(tmp_path / "a.yaml", changes=changes | {"objective": "csd_yellow_red"}).warnings
-
-
-def test_distances_along_one_channel_are_those_of_the_best_brightness() -> None:
-    rng = np.random.default_rng(7)
-    members = {"a": np.array([4, 0]), "b": np.array([1, 5, 2]), "c": np.array([3])}
-    for channels in (1, 2, 4, 5):
-        fixed, values = rng.uniform(-5, 90, (6, channels)), rng.uniform(-5, 90, (70, 6))
-        unlit = np.tile(rng.uniform(0, 3, channels), (70, 1))
-        unlit[:, 0] = rng.uniform(0, 3, 70)
-        pairs = [("a", "b"), ("a", "c")]
-        found, most_dn, least_dn = chromatic_along(fixed, 0, values, unlit, members, pairs)
-        response = np.repeat(fixed[None], 70, axis=0)
-        response[..., 0] = values
-        lit = response - unlit[:, None]
-        for a, b in pairs:
-            both = [(lit[:, i], lit[:, j]) for i in members[a] for j in members[b]]
-            rays = [least_over_brightness(*order) for one, other in both for order in ((one, other), (other, one))]
-            np.testing.assert_allclose(found[a, b], np.min(rays, axis=0), rtol=1e-6, atol=1e-6)
-        np.testing.assert_allclose(most_dn, response.max(axis=(1, 2)))
-        np.testing.assert_allclose(np.maximum(least_dn, 0), np.maximum(lit.max(axis=2).min(axis=1), 0), atol=1e-9)

@@ -1,4 +1,4 @@
-"""The paper's exposure and the columns of an evaluation, against the formula written out by hand."""
+"""The exposure that a filter sets, and field positions, of whole evaluations."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import trapezoid
 
 from sweep.camera.camera import Camera
 from sweep.camera.linear import linear_model
 from sweep.camera.model import scene_model
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.scene import Scene, WhitePatchExposure
+from sweep.camera.scene import Scene
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.sensor_field import SensorField
 from sweep.camera.setup import Setup
@@ -31,36 +30,10 @@ FAMILY = Stopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"])
 X = np.array([[606.6, 36.5, 645.8, 6.8, 1.0], [600.0, 20.0, 660.0, 30.0, 0.7]])
 
 
-def setup(name: str = "RYNCy", scenario: Scene | None = None, base: str = "Y") -> Setup:
-    mosaic = Mosaic.from_name(name)
-    replaced = {"N": base} if "N" in mosaic.channels else None
-    modified = (mosaic.channels.index("N"),) if replaced else ()
-    qe = SENSOR.mosaic_qe(mosaic, replaced)
+def setup(scenario: Scene | None = None, base: str = "Y") -> Setup:
+    mosaic = Mosaic.from_name("RYNCy")
+    modified, qe = (mosaic.channels.index("N"),), SENSOR.mosaic_qe(mosaic, {"N": base})
     return Setup(Camera(GRID, mosaic, qe, modified, SENSOR.qe["C"], Pixel()), LIGHTS, scenario or Scene())
-
-
-def by_hand(qe: dict[str, np.ndarray], level: float, ratio: float) -> np.ndarray:
-    """design.md's DN_c(signal) = level 4095 K sum(S q_c) / max_c' sum(W q_c'), S and W of equal photons."""
-    white = {c: trapezoid(q) / 300 for c, q in qe.items()}
-    top = max(white.values())
-    rows = [[level * 4095 * ratio * trapezoid(s * q) / top for q in qe.values()] for s in LIGHTS.photons]
-    return np.array(rows)
-
-
-@pytest.mark.parametrize(("level", "ratio"), [(0.95, None), (0.5, 0.08)])
-def test_response_is_the_papers_exposure(level: float, ratio: float | None) -> None:
-    exposure = WhitePatchExposure(level=level, photon_ratio=ratio)
-    found = smooth_response(setup(scenario=Scene(exposure=exposure)), FAMILY.curves(X))[:, 0]
-    for design, curve in zip(found, FAMILY.curves(X)[:, 0], strict=True):
-        qe = {"R": SENSOR.qe["R"], "Y": SENSOR.qe["Y"], "N": curve, "Cy": SENSOR.qe["Cy"]}
-        np.testing.assert_allclose(design, by_hand(qe, level, ratio or LIGHTS.photon_ratio), rtol=1e-12)
-
-
-def test_a_plain_cfa_has_a_sensitivity_and_its_filter_none() -> None:
-    plain = evaluate(scene_model(setup("RGGB")), np.empty((1, 0, 301)))
-    assert np.isnan(plain["sensitivity"][0])
-    rggb = trapezoid(SENSOR.qe["R"] + 2 * SENSOR.qe["G"] + SENSOR.qe["B"]) / 4 / trapezoid(SENSOR.qe["C"])
-    assert plain["cfa_sensitivity"][0] == pytest.approx(rggb, rel=1e-13, abs=0)
 
 
 def test_gradients_agree_with_central_differences_where_the_filter_sets_the_exposure() -> None:

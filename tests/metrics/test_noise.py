@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
-from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 
-import sweep
 from sweep.base.errors import StudyError
 from sweep.camera.model import SceneModel
-from sweep.metrics.columns.confusion import STATE_ERROR
-from sweep.metrics.evaluate import evaluate
-from sweep.report import read_output
-from sweep.report.sections.noise import Noise
-from sweep.runs import run_study
-from sweep.spectra.lights import Lights
 from sweep.study import load_study
 
 from ..draws import draws_dn
@@ -70,28 +59,6 @@ def test_a_scene_has_its_own_noise() -> None:
     assert (pixel.read_noise_e, pixel.prnu, pixel.offset_dn) == (50, 0.02, 64)
 
 
-def test_a_discriminant_of_drawn_pixels_errs_as_often_as_the_closed_form_says() -> None:
-    made = scene("dim", "RYNCy", {"noise": True, "exposure": {"kind": "white_patch", "level": 0.02}}, DARK)
-    lights = made.setup.lights
-    kept = [lights.types.index("yellow"), lights.types.index("red")]
-    two = Lights("two", ("y", "r"), ("yellow", "red"), lights.photons[kept], lights.photon_ratio, "", True)
-    model = SceneModel(replace(made.setup, lights=two))
-    closed = {name: float(values[0]) for name, values in evaluate(model, made.curves, ["yellow", "red"]).items()}
-    electrons, rng, n = model.pixel_electrons(made.curves)[0, 0], np.random.default_rng(3), 200_000
-    pixels = [draws_dn(np.broadcast_to(of, (2 * n, of.size)), model.readout.pixel, rng) for of in electrons]
-    dn, truth = np.concatenate([channels_of(model.readout, drawn, 0) for drawn in pixels]), np.repeat([0, 1], 2 * n)
-    learned = LinearDiscriminantAnalysis().fit(dn[::2], truth[::2])
-    wrong = float((learned.predict(dn[1::2]) != truth[1::2]).mean())
-    deviation = (wrong / (2 * n)) ** 0.5
-    assert wrong > 0.005  # enough errors to count
-    # No rule errs less often than the closed form, but for its 1/16 nat; nor than this (Bhattacharyya; Kailath, 1967,
-    # for equally frequent signals). One covariance for both, and Gaussians for whole numbers, cost the rule little.
-    assert (
-        closed["error_yellow_red"] / 1.07 - 4 * deviation <= wrong <= 1.1 * closed["error_yellow_red"] + 4 * deviation
-    )
-    assert wrong + 4 * deviation >= (1 - (1 - closed["error_bound_yellow_red"] ** 2) ** 0.5) / 2
-
-
 STUDY = """
 study: noisy
 columns: all
@@ -109,40 +76,6 @@ sweeps:
 recognition: {states: [yellow, red]}
 constraints: {error_yellow_red: {max: 0.5}, dprime_yellow_red: {min: 0.1}}
 """
-
-
-def _worst_error(path: Path, level: float) -> float:
-    """Of RGGB in the study, at another level of the white patch."""
-    text = (
-        path.read_text()
-        .replace(", each: {exposure.level: [0.5, 0.02]}", "")
-        .replace("white_patch", f"white_patch, level: {level}")
-    )
-    other = path.with_name("other.yaml")
-    other.write_text(text)
-    found = sweep.load_study(other).evaluate()
-    return float(found.loc[found["name"] == "RGGB", STATE_ERROR].iloc[0])
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("plain_pictures")
-def test_the_summary_of_a_noisy_study(tmp_path: Path) -> None:
-    path = tmp_path / "noisy.yaml"
-    path.write_text(STUDY)
-    run_study(load_study(path), tmp_path / "out", 1, lambda *_: None)
-    results = pd.read_parquet(tmp_path / "out" / "results.parquet")
-    assert (results["error_yellow_red"] <= results["error_bound_yellow_red"]).all()
-    assert results.loc[results["scenario"] == "dim level=0.02", STATE_ERROR].min() > 1e-3
-    output = read_output(tmp_path / "out")
-    (section,) = Noise.of(output)
-    assert isinstance(section, Noise)
-    told = re.fullmatch(r"from ([\d.]+)\s% to 50\s%, the last computed", section.steady["RGGB"])
-    assert told is not None
-    # Computed again there, a little brighter and a little dimmer.
-    brighter, dimmer = (_worst_error(path, float(told[1]) / 100 * share) for share in (1.005, 0.985))
-    assert brighter < 1e-3 < dimmer
-    # The plan keeps what the metrics need.
-    assert {"noise", "quantization", "saturation"} <= {*output.provenance.plans["dim level=0.5"].computed}
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,32 +10,11 @@ import pytest
 from sweep.camera.model import SceneModel, View
 from sweep.camera.phases import phases_at
 from sweep.metrics.evaluate import evaluate
-from sweep.spectra.lights import class_pairs
-from sweep.study import load_study
 
-from ..build import load
 from ..hard.scenes import DARK, F2, DesignScene, scene, target
 
 STATES = ("yellow", "red")
 _DIMMED = np.linspace(0.0, 1.0, 4001)
-SCENE = """\
-study: acc
-sensor: ar0820
-lights: tl16
-pixel: {pitch_um: 2.8, offset_dn: 64, prnu: 0.005, captures: split_pixel, merge: saturated}
-scenarios:
-  s:
-    optics: {f_number: 3.23, focus_m: 358.5}
-    target: {distance_m: 268.3, fov_deg: 120.0, readout: mean, phase_px: any}
-    intensity_cd: 8.6
-    exposure: {kind: fixed, exposure_s: 0.00139}
-    background_cd_m2: 200.0
-tolerance_dn: 0.1
-cfas: [RGGB, RYNCy]
-columns: all
-designs:
-  best: {cfa: RYNCy, channel: N, base: Y, to: G, at: {left_nm: 612.89, left_width_nm: 5.92, right_nm: 651.18, right_width_nm: 6.25}}
-"""
 
 
 def least_of(model: SceneModel, curves: np.ndarray) -> dict[str, float]:
@@ -93,23 +71,3 @@ def test_no_field_position_of_hundreds_is_worse() -> None:
     model = SceneModel(made.setup)
     heights = np.random.default_rng(3).uniform(0, 1, 200).tolist()
     assert_refined(made, [[*model.views(heights=[height])] for height in heights])
-
-
-def test_counting_every_pixel_changes_nothing_where_each_is_a_channel(tmp_path: Path) -> None:
-    """RYNCy has four different pixels; the worst phase lies between those of the lattice."""
-    study = load(tmp_path, SCENE)
-    space = next(space for space in study.spaces if space.name == "best")
-    setup, curves = study.setup(space, "s"), space.curves(space.points(0, 1), study.grid.size)
-    found = evaluate(SceneModel(setup), curves)
-    for a, b in class_pairs(setup.lights.classes):
-        assert found[f"pixel_csd_{a}_{b}"] == pytest.approx(found[f"csd_{a}_{b}"], rel=1e-12)
-    assert found["csd_green_yellow"][0] == pytest.approx(195.7, abs=0.1)
-
-
-def test_the_distance_of_a_lamp_at_any_place_is_the_smallest_of_its_phases() -> None:
-    """A published figure: distance, 150 m, best stopband."""
-    study = load_study(Path(__file__).parents[2] / "studies" / "distance.yaml")
-    space = next(space for space in study.spaces if space.name == "best stopband")
-    model = SceneModel(study.setup(space, "road distance_m=150"))
-    found = evaluate(model, space.curves(space.points(0, 1), study.grid.size))
-    assert found["pixel_csd_yellow_red"][0] == pytest.approx(171.23, abs=0.05)

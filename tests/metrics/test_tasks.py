@@ -15,7 +15,6 @@ from scipy.integrate import trapezoid
 from scipy.linalg import subspace_angles
 from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
-from scipy.stats import norm
 
 from sweep.camera.linear import linear_model
 from sweep.camera.setup import Setup
@@ -24,16 +23,13 @@ from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.quantity import Quantity, RequestedQuantities
 from sweep.metrics.registry import quantities_of
 from sweep.metrics.smooth import SmoothDesign
-from sweep.metrics.smooth_noise import margin
 from sweep.metrics.tasks.color import (
     ChannelNoise,
-    color_matrix,
     least_illuminance,
     metamerism_index,
     vora,
 )
 from sweep.metrics.tasks.colorimetry import delta_e_2000, lab
-from sweep.metrics.tasks.evaluation import pair_errors
 from sweep.spectra.builtin.task_sets import separation_task, shipped, spectra_of_group
 from sweep.spectra.tasks import SHIPPED, Conditions, StudyTasks
 from sweep.study.load import study_of_keys
@@ -131,16 +127,6 @@ def test_separations_are_those_of_the_nearest_pair(name: str, at: int, case: str
             assert columns()[f"{name}_{what}{end}"][number] == pytest.approx(value, rel=1e-7, abs=1e-300)
 
 
-def test_an_error_is_that_of_the_plane_between_two_points() -> None:
-    a, b = np.array([900.0, 500.0, 300.0]), np.array([905.0, 490.0, 306.0])
-    noise = ChannelNoise(np.array([0.25, 0.5, 0.25]), 2.0)
-    told = float(pair_errors(margin((a - b)[None], noise.of(a)[None], noise.of(b)[None]))[0])
-    normal = (a - b) / (noise.of(a) + noise.of(b))
-    spread = sum(np.sqrt(normal**2 @ noise.of(p)) for p in (a, b))
-    assert told == pytest.approx(norm.sf(normal @ (a - b) / spread), rel=1e-12)
-    assert noise.of(a) == pytest.approx((a + 2.0**2) / [1, 2, 1], rel=1e-12)
-
-
 def test_lab_and_ciede2000_are_those_of_colour_science() -> None:
     rng = np.random.default_rng(2)
     xyz, white = rng.uniform(0, 1, (3000, 3)), np.array([0.95, 1.0, 1.09])
@@ -217,24 +203,6 @@ def test_the_metamerism_index_has_the_least_mean_difference() -> None:
     assert metamerism_index((xyz @ np.array([[0.9, 0.1, 0.0], [0.3, 1.0, 0.2], [0.0, 0.1, 0.7]]))[None], xyz, white)[
         0
     ] == pytest.approx(100, abs=1e-6)
-
-
-def test_the_matrix_is_the_best_one_under_noise() -> None:
-    """Steps away from the matrix in every direction."""
-    rng = np.random.default_rng(3)
-    electrons = np.array([[900.0, 200, 90], [150, 800, 200], [80, 150, 700], [700, 750, 200], [400, 500, 450.0]])
-    xyz, white = rng.uniform(0.05, 0.9, (5, 3)), np.array([0.95, 1.0, 1.09])
-    noise = ChannelNoise(np.array([0.25, 0.5, 0.25]), 3.0)
-    told = color_matrix(electrons[None], xyz, white, noise)[0]
-
-    def expected(matrix: np.ndarray) -> float:
-        seen = ((electrons @ matrix - xyz / white) ** 2).sum(axis=1) + (noise.of(electrons) @ matrix**2).sum(axis=1)
-        return float((xyz[:, 1] ** (-4 / 3) * seen).sum())
-
-    least = expected(told)
-    for step in rng.standard_normal((200, 3, 3)) * 1e-3 * np.abs(told).max():
-        assert expected(told + step) > least
-    assert expected(color_matrix(electrons[None], xyz, white, noise, 3.0)[0]) > least
 
 
 def test_the_least_illuminance_has_its_luminance_snr() -> None:
