@@ -17,12 +17,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).parent.parent
 GOLDEN, EFFECTS, PLAN = "contracts/test_golden.py", "camera/test_effects.py", "camera/test_plan.py"
 CAPTURES, LIMIT, SEARCH = "camera/test_captures.py", "search/test_limit.py", "search/test_search.py"
-SMOOTH, DAMAGE, RUNNER, TERMS = (
-    "search/test_smooth.py",
-    "results/test_damage.py",
-    "run/test_runner.py",
-    "contracts/test_terms.py",
-)
+SMOOTH, DAMAGE, RUNNER = "search/test_smooth.py", "results/test_damage.py", "run/test_runner.py"
 
 
 class Mutant(NamedTuple):
@@ -139,7 +134,7 @@ MUTANTS = (
         "weighted = np.moveaxis(total_qe, -1, 0)",
     ),
     Mutant("metrics/separation", "start=weighted[0]) / counts.sum()", "start=weighted[0]) / counts.size"),
-    Mutant("metrics/objective", "weight * columns[name]", "columns[name] / weight", TERMS),
+    Mutant("metrics/objective", "weight * columns[name]", "columns[name] / weight", "search/test_tasks.py"),
     Mutant("metrics/bound", "self.min - values", "values - self.min", SEARCH),
     Mutant("metrics/bound", "end = max(abs(self.min or 0.0)", "end = min(abs(self.min or 0.0)", RUNNER),
     Mutant("metrics/bound", "if quantity not in leave_out", "if quantity in leave_out", RUNNER),

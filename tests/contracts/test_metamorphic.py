@@ -118,26 +118,22 @@ def test_an_order_changes_nothing(study: Callable[..., Study], what: str) -> Non
     assert_same(values_of(study()), values_of(study(REORDERED[what])))
 
 
-def test_columns_of_a_file_in_another_order_change_nothing(study: Callable[..., Study]) -> None:
+def in_unit(name: str, per_nm: float) -> pd.DataFrame:
+    """Spectra whose wavelengths have another unit."""
     table = leds()
-    assert_same(
-        values_of(study()), values_of(study(table=table[["wavelength_nm", *sorted(table.columns[1:], reverse=True)]]))
-    )
+    return table.assign(wavelength_nm=per_nm * table["wavelength_nm"]).rename(columns={"wavelength_nm": name})
 
 
 @pytest.mark.parametrize(
-    ("head", "values"),
-    [("wavelength_um", lambda wave: wave / 1000), ("wavelength_A", lambda wave: 10 * wave)],
-    ids=["micrometers", "angstroms"],
+    "table",
+    [
+        leds()[["wavelength_nm", *sorted(leds().columns[1:], reverse=True)]],
+        in_unit("wavelength_um", 1e-3),
+        in_unit("wavelength_A", 10.0),
+    ],
+    ids=["another order", "micrometers", "angstroms"],
 )
-def test_another_unit_of_the_wavelengths_changes_no_curve(
-    study: Callable[..., Study], head: str, values: Callable[[np.ndarray], np.ndarray]
-) -> None:
-    table = (
-        leds()
-        .assign(wavelength_nm=lambda frame: values(frame["wavelength_nm"]))
-        .rename(columns={"wavelength_nm": head})
-    )
+def test_another_order_or_unit_of_a_file_changes_nothing(study: Callable[..., Study], table: pd.DataFrame) -> None:
     assert_same(values_of(study()), values_of(study(table=table)))
 
 

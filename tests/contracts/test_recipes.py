@@ -21,68 +21,6 @@ from sweep.spectra.spectrum import WavelengthGrid
 
 from ..commanded import commanded
 
-GRAY = '''\
-"""A filter that takes the same share of all light."""
-
-import numpy as np
-
-from sweep.designs.family import Parameter
-from sweep.base.types import Section
-
-
-class Gray:
-    kind = "gray"
-    n_modified = 1
-    needs_target = False
-    Options = Section
-    start_dimensions = None
-    parameters = (Parameter("share", 0, 1),)
-    dimensions = {}
-
-    def __init__(self, base):
-        self._base = base
-
-    @classmethod
-    def of_study(cls, wavelength_nm, base, target, options):
-        return cls(base)
-
-    def curves(self, x):
-        return (self._base * x[:, :1])[:, None, :]
-
-    def upper(self, low, high):
-        return self.curves(high[None])[0]
-
-    def lower(self, low, high):
-        return self.curves(low[None])[0]
-
-    def hull(self, low, high):
-        return self.lower(low, high), self.upper(low, high)
-
-    def gradient(self, x):
-        return self._base[None, None, :].copy()
-
-    def perturbed(self, production_error):
-        return self
-
-    def start(self, points):
-        return points
-
-    def violation(self, x):
-        return np.zeros((len(x), 1))
-
-    def violation_gradient(self, x):
-        return np.zeros((1, 1))
-'''
-STUDY = """\
-study: gray
-sensor: ar0820
-lights: tl16
-cfas: [RGGB, RYNCy]
-sweeps:
-  shares: {cfa: RYNCy, family: gray, channel: N, base: Y, grid: {share: {min: 0, max: 1, count: 21}}}
-constraints: {sensitivity: {min: 0.6}}
-search: {starts: 2, max_evaluations: 60}
-"""
 WINDSHIELD = '''\
 """A windshield of tinted glass."""
 
@@ -103,20 +41,6 @@ EFFECTS
 scenarios:
   chart: {exposure: {kind: fixed, exposure_s: 0.004}, background_cd_m2: 30}
 """
-HELLO = '''\
-"""Say hello."""
-
-import typer
-
-from sweep.cli.options import OF_TOOL
-
-PANEL = OF_TOOL
-
-
-def hello(name: str) -> None:
-    """Greet somebody."""
-    typer.echo(f"Hello, {name}.")
-'''
 
 RED_SHARE = '''\
 """How much of the red light a filter lets through."""
@@ -166,29 +90,12 @@ class RedShare(Metric):
             return {NAME: np.full(batch.size, np.nan)}
         return {NAME: batch.curves[:, 0] @ _weights(batch.setup)}
 '''
-DARKEST = '''\
-"""The weakest signal of a scene."""
-
-from sweep.metrics.quantity import Quantity
-from sweep.metrics.metric import Metric
-
-
-class Darkest(Metric):
-    order = 10
-
-    def quantities(self, requested):
-        return (Quantity("darkest_dn", "darkest_dn", "weakest signal in its best channel", "DN", direction="more"),)
-
-    def of_readings(self, readings):
-        return {"darkest_dn": readings.dn.max(axis=2).min(axis=1)}
-'''
-WITH_METRICS = """\
+WITH_METRIC = """\
 study: red
 columns: all
 sensor: ar0820
 lights: tl16
 cfas: [RYNCy]
-production: {edge_shift_nm: 2}
 sweeps:
   edges:
     cfa: RYNCy
@@ -202,83 +109,34 @@ search: {starts: 3, max_evaluations: 150}
 
 
 ROOM = """\
-import sys, {package} as room
+import sys, sweep.metrics.columns as room
 room.__path__.append(sys.argv.pop(1))
-{drawings}
+from sweep.report.panels import Picture
+Picture.svgs, Picture.files = lambda *_: ("", ""), lambda *_: {}
 from sweep.cli.app import main
 main()
 """
-NO_DRAWINGS = (
-    "from sweep.report.panels import Picture; Picture.svgs = lambda *_: ('', ''); Picture.files = lambda *_: {}"
-)
-
-
-def with_file(package: str, file: Path, *arguments: object, drawn: bool = False) -> subprocess.CompletedProcess[str]:
-    """The command, with one more file in a package; its reports have pictures where that is asked for."""
-    program = ROOM.format(package=package, drawings="" if drawn else NO_DRAWINGS)
-    command = [sys.executable, "-c", program, str(file.parent), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
-
-
-@pytest.mark.slow
-def test_a_family_is_one_new_file(tmp_path: Path) -> None:
-    folder = run_with(tmp_path, "sweep.designs.families", "gray.py", GRAY, STUDY, drawn=True)
-    rows = pd.read_parquet(folder / "results.parquet")
-    swept = rows[rows["kind"] == "sweep"]
-    assert set(rows["status"]) == {"ok"}
-    assert swept["sensitivity"].tolist() == pytest.approx(swept["share"].tolist())
-    # The best that is found is as good as the best that was swept, but for rounding.
-    best, front = rows[rows["kind"] == "search"].iloc[0], swept[swept["feasible"]]
-    assert best["family"] == "gray"
-    assert best["csd_yellow_red"] >= front["csd_yellow_red"].max() - 1
-    assert (folder / "report.html").is_file()
-    code, _, without = commanded("check", tmp_path / "study.yaml")
-    assert code == 2
-    assert "unknown family (got 'gray')" in without
-
-
-def test_a_command_is_one_new_file(tmp_path: Path) -> None:
-    file = tmp_path / "hello.py"
-    file.write_text(HELLO)
-    done = with_file("sweep.cli.commands", file, "hello", "world", drawn=True)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "Hello, world.\n", "")
-    assert " hello " in with_file("sweep.cli.commands", file, "--help", drawn=True).stdout
-
-
-def run_with(tmp_path: Path, package: str, file: str, program: str, study: str, *, drawn: bool = False) -> Path:
-    """The folder of a finished run of a study, with one more file in a package."""
-    path = tmp_path / "more" / file
-    path.parent.mkdir(exist_ok=True)
-    path.write_text(program)
-    (tmp_path / "study.yaml").write_text(study)
-    command = "run", tmp_path / "study.yaml", "--output", tmp_path / "out", "--jobs", 1
-    done = with_file(package, path, *command, drawn=drawn)
-    assert done.returncode == 0, done.stderr
-    (folder,) = (tmp_path / "out").iterdir()
-    return folder
 
 
 @pytest.mark.slow
 def test_a_metric_is_one_new_file(tmp_path: Path) -> None:
     (tmp_path / "more").mkdir()
-    (tmp_path / "more" / "darkest.py").write_text(DARKEST)
-    folder = run_with(tmp_path, "sweep.metrics.columns", "red_share.py", RED_SHARE, WITH_METRICS)
+    (tmp_path / "more" / "red_share.py").write_text(RED_SHARE)
+    (tmp_path / "study.yaml").write_text(WITH_METRIC)
+    command = sys.executable, "-c", ROOM, tmp_path / "more", "run", tmp_path / "study.yaml", "--output", tmp_path
+    done = subprocess.run([*command, "--jobs", "1"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "red"
     rows = pd.read_parquet(folder / "results.parquet")
     assert set(rows["status"]) == {"ok"}
     curves = pd.read_parquet(folder / "curves.parquet")
     base = curves[(curves["kind"] == "qe") & (curves["curve"] == "Y")].set_index("wavelength_nm")["value"]
     drawn = curves[curves["kind"] == "design"].groupby("design_id")
-    points = pd.read_parquet(folder / "points.parquet")
     for design, curve in drawn:
-        row = rows.loc[design]
         own = curve.set_index("wavelength_nm")["value"]
-        assert row["red_share"] == pytest.approx(own.loc[600:].sum() / base.loc[600:].sum(), rel=1e-12)
-        own_points = points[points["design_id"] == design]
-        assert row["darkest_dn"] == own_points.groupby("signal")["dn"].max().min()
-    # The worst case over shifted edges, the constraint, the search and the limit know it.
+        assert rows.loc[design, "red_share"] == pytest.approx(own.loc[600:].sum() / base.loc[600:].sum(), rel=1e-12)
+    # The constraint, the search and the limit know it.
     made = rows[rows["kind"] != "reference"]
-    assert (made["worst_red_share"] <= made["red_share"]).all()
-    assert (made["worst_red_share"] < made["red_share"]).any()
     assert (made["feasible"] == (made["red_share"] >= 0.8 * (1 - 1e-9))).all()
     best, swept = rows[rows["kind"] == "search"].iloc[0], made[(made["kind"] == "sweep") & made["feasible"]]
     assert best["red_share"] == pytest.approx(0.8, abs=1e-6)
@@ -286,7 +144,6 @@ def test_a_metric_is_one_new_file(tmp_path: Path) -> None:
     search = json.loads((folder / "provenance.json").read_text())["search"]
     assert search["upper_bound_proven"] >= best["csd_yellow_red"] - 1
     assert search["upper_bound_left_out"] == []
-    assert "share of red" in (folder / "report.html").read_text()
 
 
 def distance_dn(tint: float) -> float:
@@ -319,7 +176,4 @@ def test_an_effect_is_a_function_in_a_file(tmp_path: Path) -> None:
         assert [e["computed"] for e in effects_of_plan if e["effect"] == "windshield"] == [True] * (name == "behind")
     assert distances["open"] == pytest.approx(distance_dn(1.0), abs=1e-9)
     assert distances["behind"] == pytest.approx(distance_dn(0.7), abs=1e-9)
-    assert distances["behind"] < 0.8 * distances["open"]
-    code, _, error = commanded("check", study)
-    assert code == 2
-    assert "--allow-code, if you trust it" in error
+    assert commanded("check", study)[0] == 2  # no code without being asked

@@ -13,7 +13,6 @@ from scipy.integrate import trapezoid
 from scipy.spatial.distance import cdist
 
 from sweep.camera.model import SceneModel
-from sweep.designs import block as blocks
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.stopband import MultiStopband
@@ -84,15 +83,13 @@ def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
     assert every is None
 
 
-def test_the_separable_route_refuses_inseparable_curves(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_separable_route_refuses_inseparable_curves() -> None:
     two = MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], bands=2)
     free = FreeForm(GRID.nodes_nm, SENSOR.qe["Y"], np.array([500.0, 600.0]))
     for family, axes in ((two, AXES + AXES), (free, ((0.5,), (0.5,)))):
         assert edges_of(Space("sweep", "x", "RYNCy", Filter(family, {"N": "Y"}, ""), axes), 0, 1) is None
     assert edges_of(Space("reference", "RGGB", "RGGB"), 0, 1) is None
     assert edges_of(replace(SPACE, gridded=False), 0, 1) is None
-    monkeypatch.setattr(blocks, "_MOST_BYTES", 1000)
-    assert edges_of(replace(SPACE), 0, 1) is None  # a space that was not seen before
 
 
 @settings(max_examples=60, deadline=None)

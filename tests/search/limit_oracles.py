@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.optimize import Bounds, LinearConstraint, linprog, milp
+from scipy.optimize import Bounds, LinearConstraint, milp
 
 from sweep.designs.families.free_form import FreeForm
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
@@ -24,7 +24,7 @@ sensor: {files: [{file: qe.csv, columns: {Y: Y, R: R, C: C}}], clear: C}
 lights:
   files:
     - {file: lights.csv, quantity: photons, signals: {yellow: [a], red: [b, c]}}
-wavelengths: {start_nm: 400, stop_nm: 700, step_nm: STEP}
+wavelengths: {start_nm: 400, stop_nm: 700, step_nm: 10}
 cfas:
   RYNC: {tile: [[R, Y], [N, C]]}
 boxes:
@@ -49,7 +49,7 @@ def halved(values: np.ndarray) -> np.ndarray:
     return weighted
 
 
-def write_study(folder: Path, step_nm: float) -> Path:
+def write_study(folder: Path) -> Path:
     """Yellow at 600 nm between two reds at 560 and 640 nm, seen through a ramp from 520 to 680 nm."""
     wave = np.arange(400, 701)
     qe = {"Y": np.interp(wave, [520, 680], [0.02, 0.82]), "R": 0 * wave + 0.5, "C": 0 * wave + 0.9}
@@ -57,7 +57,7 @@ def write_study(folder: Path, step_nm: float) -> Path:
     for name, columns in (("qe", qe), ("lights", lights)):
         pd.DataFrame({"wavelength_nm": wave, **columns}).to_csv(folder / f"{name}.csv", index=False)
     path = folder / "sides.yaml"
-    path.write_text(TEXT.replace("STEP", f"{step_nm:g}"))
+    path.write_text(TEXT)
     return path
 
 
@@ -186,19 +186,3 @@ def random_problem(template: Problem, seed: int) -> Problem:
         high=np.ones(family.nodes_nm.size),
         constraints={"sensitivity": Bound(min=rng.uniform(0.5, 0.95)), "slope_per_nm": Bound(max=0.06)},
     )
-
-
-def bounded_slopes(base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and least values of a sensitivity of 0.9 and slopes of 0.06 per nm on a grid of 1 nm: rows @ N >= least."""
-    step = np.diff(np.eye(base.size), axis=0)
-    rows = np.concatenate([halved(np.ones((1, base.size))), step, -step])
-    return rows, np.append(0.9 * halved(base).sum(), np.full(2 * len(step), -0.06))
-
-
-def linear_margin(by_qe: np.ndarray, needed: np.ndarray, base: np.ndarray) -> float:
-    """The largest m for which a filter has by_qe @ N >= needed + m; -inf where there is no filter at all."""
-    rows, least = bounded_slopes(base)
-    matrix = np.concatenate([np.column_stack([-by_qe, np.ones(len(by_qe))]), np.pad(-rows, ((0, 0), (0, 1)))])
-    ends = [*zip(np.zeros(base.size), base, strict=True), (None, None)]
-    solution = linprog(np.append(np.zeros(base.size), -1.0), matrix, np.append(-needed, -least), bounds=ends)
-    return float(solution.x[-1]) if solution.status == 0 else -np.inf

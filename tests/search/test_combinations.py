@@ -6,17 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
-import sweep
 from sweep.base.errors import StudyError
 from sweep.base.types import in_turn
 from sweep.designs.families.mixture import Mixture
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.smooth import smooth_csd
-from sweep.runs import run_study
-from sweep.runs.audit import audit_rows
 from sweep.search.combinations import Choice, choose, with_members
 from sweep.search.problem import Problem, starting_points
 from sweep.study import load_study
@@ -54,8 +50,7 @@ def chosen(task: Problem, exhaustive: int) -> Choice:
 def test_exchange_finds_the_best_pair_of_all(tmp_path: Path) -> None:
     task = problem(tmp_path, 2, 30)
     exhaustive, exchange = chosen(task, 1_000), chosen(task, 0)
-    assert exhaustive.counts == ("all 30 singles", "all 435 pairs")
-    assert exchange.counts[1].endswith("of 435 pairs by exchange")
+    assert len(exhaustive.tried) == 30 + 435
     assert len(exchange.tried) < 0.6 * len(exhaustive.tried)
     assert exchange.best == exhaustive.best
     largest = exhaustive.tried[exhaustive.best].objective
@@ -111,43 +106,3 @@ def test_an_unsuitable_range_of_colorants_is_refused(tmp_path: Path, box: str, s
     (tmp_path / "mix.yaml").write_text(STUDY.replace("SLOTS", "2").replace("BOX", box))
     with pytest.raises(StudyError, match=said):
         load_study(tmp_path / "mix.yaml")
-
-
-def test_a_mixture_is_the_curve_of_its_colorants_in_every_metric(tmp_path: Path) -> None:
-    """A row, with its noise, tasks and lamps, is that of the curve base times 10^-absorbance; the audit is clean."""
-    before = """\
-tasks: [color, low_light, vehicle_lamps]
-pixel: {read_noise_e: 2, offset_dn: 64}
-scenarios: {field: {noise: true, optics: {f_number: 4}, field: {cra_max_deg: 20, places: 3}}}
-recognition: {states: [yellow, red]}
-population: {temperature_c: [0, 60], binning_nm: 2, drift_nm_per_k: 0.1}
-production: {edge_shift_nm: 1, thickness: 0.05, broadening: 0.2}
-"""
-    design = "{colorant_1: 'modeled band 630 nm, FWHM 30 nm', absorbance_1: 0.6, colorant_2: 7, absorbance_2: 0.1}"
-    text = (
-        STUDY.split("boxes:", maxsplit=1)[0]
-        + before
-        + "designs:\n  two: {cfa: RYNCy, channel: N, base: Y, family: mixture,"
-    )
-    (tmp_path / "mix.yaml").write_text(f"{text} options: {{at_most: 2}}, at: {design}}}\n")
-    study = load_study(tmp_path / "mix.yaml")
-    run_study(study, tmp_path / "out", 1, lambda *_: None)
-    rows = pd.read_parquet(tmp_path / "out" / "results.parquet")
-    assert audit_rows(study, [rows], ()).issues == []
-    (row,) = rows[rows["name"] == "two"].to_dict("records")
-    grid, base = study.grid.nodes_nm, study.sensor.qe["Y"]
-    absorbed = 0.6 * gaussian_in_wavenumber(grid, 630, 30) + 0.1 * gaussian_in_wavenumber(grid, 580, 30)
-    loaded = sweep.load_study(tmp_path / "mix.yaml")
-    ((_, same),) = loaded.evaluate(cfa="RYNCy", N=base * 10.0**-absorbed).iterrows()
-    compared = [name for name in same.index if name in row and not name.startswith("worst_")]
-    assert {"csd_yellow_red", "color_delta_e_mean_d65", "low_light_lux_a"} <= set(compared)
-    for name in compared:
-        if isinstance(row[name], float) and np.isfinite(row[name]):
-            assert same[name] == pytest.approx(row[name], rel=1e-9), name
-    assert row["worst_csd_yellow_red"] < row["csd_yellow_red"]
-
-
-def gaussian_in_wavenumber(wave_nm: np.ndarray, peak_nm: float, fwhm_nm: float) -> np.ndarray:
-    """Width in 1/nm from that in nm at the peak."""
-    width_per_nm = fwhm_nm / peak_nm**2
-    return np.exp(-4 * np.log(2) * ((1 / wave_nm - 1 / peak_nm) / width_per_nm) ** 2)

@@ -5,20 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
 
 from sweep.base.errors import SweepError
+from sweep.camera.pixel import Pixel
 from sweep.camera.scene import FixedExposure, Scene
 from sweep.designs.families.stopband import Stopband
 from sweep.designs.tolerance import NONE, Tolerance
 from sweep.metrics.bound import FEASIBLE, Bound
 from sweep.metrics.objective import Objective
-from sweep.report.sections.method import limit_line
-from sweep.results.facts import SearchFacts
-from sweep.results.output import Output
 from sweep.search.gradients import Model
 from sweep.search.problem import Problem, SearchRun, starting_points
 from sweep.search.trade_off import check_proof
@@ -53,6 +50,8 @@ def test_no_upper_bound_is_claimed_where_the_program_is_not_linear() -> None:
     with pytest.raises(SweepError, match="no upper bound: the objective is a sum"):
         upper_bound_of(other)
     assert reason_without_bound(problem_of("dual")) == "more than one modified channel"
+    mixed = replace(PROBLEM, setup=SETUP.with_camera(pixel=Pixel(crosstalk=0.01)))
+    assert reason_without_bound(mixed) == "crosstalk mixes the modified channel into others"
 
 
 def test_least_loss_of_sensitivity_is_the_inverse_of_the_largest_separation() -> None:
@@ -87,53 +86,6 @@ def test_no_upper_bound_is_claimed_where_it_would_not_hold() -> None:
     assert (
         reason_without_bound(replace(PROBLEM, setup=bright)) == "signals exceed the full well or the range of the ADC"
     )
-
-
-def test_report_words_match_the_proof() -> None:
-    """A finished proof, one that was cut short, and levels that were."""
-
-    class OfSearch(Output):
-        """What the line asks of a run."""
-
-        goal: Any = PROBLEM.quantities["csd_yellow_red"]
-        study: Any = STUDY.section
-        scenarios: Any = list(STUDY.scenarios)
-
-        def __init__(self) -> None: ...
-
-    output = OfSearch()
-    done = SearchFacts(
-        algorithm="SLSQP",
-        scenario="chart",
-        space="edges",
-        cfa="RYNCy",
-        channel="N",
-        bounded=("search edges",),
-        starts=1,
-        evaluations=1,
-        endings=("success",),
-        objective="csd_yellow_red",
-        best_smooth_objective=90.0,
-        best_sensitivity=0.9,
-        upper_bound_attained=90.0,
-        upper_bound_proven=100.0,
-        upper_bound_left_out=("edge_width_nm",),
-        upper_bound_programs=9,
-        upper_bound_open_parts=0,
-        front_upper_bounds_open=0,
-        gap=0.1,
-        no_upper_bound=None,
-        front_evaluations=0,
-    )
-    words = limit_line(output, done)
-    bracket = "for any filter in N of RYNCy: 100.0 DN (proven), and one filter comes within 10 DN of it"
-    assert f"{bracket}; the search's answer is 10.0 % below it" in words
-    assert "under the same constraints but edge_width_nm, before clipping and quantization" in words
-    assert "open" not in words
-    cut = limit_line(output, done.model_copy(update={"upper_bound_open_parts": 3}))
-    assert "it may not be the least one: 3 parts are open after 9 linear programs" in cut
-    none = done.model_copy(update={"no_upper_bound": "the objective is a sum", "upper_bound_proven": None})
-    assert limit_line(output, none) == "Upper bound: none computed (the objective is a sum)."
 
 
 @pytest.mark.parametrize("level", [0.8, 0.9, 1.0])

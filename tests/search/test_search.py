@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,16 +14,14 @@ from sweep.designs.families.free_form import FreeForm
 from sweep.metrics.bound import FEASIBLE, Bound
 from sweep.metrics.evaluate import designed_quantities
 from sweep.report import read_output
-from sweep.report.sections.method import Method
 from sweep.runs import search as searching
-from sweep.runs.dry_run import remaining_work, remaining_work_lines
 from sweep.search import trade_off
 from sweep.search.gradients import Model
 from sweep.search.problem import CONVERGED, Evaluation, Problem, SearchRun, best_feasible, starting_points
 from sweep.search.solver import ALGORITHMS, ONE_START, search_from
 from sweep.search.upper_bound import UpperBound, upper_bound_of
 
-from ..build import load, ran, sentences_of, stopband_study
+from ..build import load, ran, stopband_study
 from ..commanded import commanded
 from .problems import PROBLEM, STUDY, best_of
 
@@ -67,14 +64,6 @@ def test_a_search_ends_where_its_algorithm_asks_for_no_number() -> None:
     assert len(run.log) == 1
 
 
-def test_a_solver_that_fails_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object) -> None:
-        raise RuntimeError
-
-    monkeypatch.setattr("nlopt.opt.optimize", fails)
-    assert search_from(PROBLEM, 0, np.full(N_FREE, 0.5), "SLSQP", 10).status == "failed"
-
-
 def test_same_seed_gives_the_same_log() -> None:
     u = starting_points(PROBLEM, 3, 5)
     np.testing.assert_array_equal(u, starting_points(PROBLEM, 3, 5))
@@ -95,7 +84,6 @@ def test_best_of_a_log() -> None:
     [
         ("COBYLA", 0.95),
         pytest.param("ISRES", 0.5, marks=pytest.mark.slow),
-        pytest.param("ORIG_DIRECT_L", 0.6, marks=pytest.mark.slow),
     ],
 )
 def test_every_algorithm_finds_feasible_designs_within_its_budget(algorithm: str, share: float) -> None:
@@ -211,8 +199,7 @@ def test_a_global_search_takes_one_start_and_ends_at_the_optimum_of_gradients(tm
     study = load(tmp_path, CASE)
     assert study.search is not None
     ran(study, tmp_path / "out", 1)
-    output, log = read_output(tmp_path / "out"), pd.read_parquet(tmp_path / "out" / "search.parquet")
-    facts = output.provenance.search
+    facts, log = read_output(tmp_path / "out").provenance.search, pd.read_parquet(tmp_path / "out" / "search.parquet")
     assert facts is not None
     assert facts.best_smooth_objective == pytest.approx(234.2, abs=0.1)
     assert facts.endings[0] == "maxeval_reached"
@@ -220,25 +207,8 @@ def test_a_global_search_takes_one_start_and_ends_at_the_optimum_of_gradients(tm
     at_levels = log["sensitivity_min"].notna()
     assert facts.evaluations == (~at_levels).sum() > 100
     assert facts.front_evaluations == at_levels.sum()
-    planned = "\n".join(remaining_work_lines(remaining_work(study, tmp_path / "none"), tmp_path))
-    (most,) = re.findall(r"1 start, then SLSQP, (\d+) evaluations at most", planned)
-    assert facts.evaluations <= int(most)
     front = pd.read_parquet(tmp_path / "out" / "search_front.parquet").set_index("sensitivity_min")
     assert front.loc[0.9, "objective"] == pytest.approx(facts.best_smooth_objective, rel=1e-6)
-    lines = "\n".join([*sentences_of(output), *next(iter(Method.of(output))).limits])
-    assert "separates yellow from red lamps by 234 DN" in lines
-    assert f"Searched: ORIG_DIRECT_L and SLSQP, 1 start, {facts.evaluations} evaluations; seed" in lines
-    assert "converged" not in lines
-
-
-def test_a_search_that_has_not_converged_says_so(tmp_path: Path) -> None:
-    study = load(tmp_path, re.sub("search: .*", "search: {starts: 2, max_evaluations: 10}", TINY))
-    ran(study, tmp_path / "out", 1)
-    output = read_output(tmp_path / "out")
-    assert "(best found; no start converged)" in sentences_of(output)[0]
-    assert any(
-        line.startswith("Note: no start of the search converged") for line in next(iter(Method.of(output))).limits
-    )
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)

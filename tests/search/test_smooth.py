@@ -7,15 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sweep.camera.accuracy import Accuracy
-from sweep.camera.pixel import Pixel
-from sweep.camera.scene import Scene
 from sweep.designs.tolerance import NONE, Tolerance
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
-from sweep.metrics.smooth import smooth_csd
 from sweep.search.problem import Problem, starting_points
-from sweep.search.upper_bound import reason_without_bound, upper_bound_of
 
 from .problems import PROBLEM, best_of, csd_of, problem_of, rows_at
 
@@ -56,35 +51,6 @@ def test_derivatives_agree_with_differences(name: str, objective: Objective) -> 
     problem = replace(problem, objective=objective, constraints=own, tolerance=Tolerance(2.0))
     u = np.clip(starting_points(problem, 3, 4)[2], 0.05, 0.95)
     check_derivatives(problem, u, range(0, u.size, 7 if name == "freeform" else 1))
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [
-        {"target": {"distance_m": 250, "fov_deg": 30, "phase_px": "any"}, "optics": {"f_number": 2.0}},
-        {"target": {"distance_m": 250, "fov_deg": 30, "readout": "center"}, "optics": {"f_number": 2.0}},
-        {"background_cd_m2": 100, "exposure": {"kind": "fixed", "exposure_s": 0.003}, "off_axis_deg": 20},
-        {"drive": {"duty": 0.4, "frequency_hz": 90}, "exposure": {"kind": "fixed", "exposure_s": 0.003}},
-    ],
-    ids=["any phase", "center", "background", "pulses"],
-)
-@pytest.mark.parametrize("crosstalk", [0.0, 0.05])
-def test_derivatives_hold_in_scenes(scene: dict[str, object], crosstalk: float) -> None:
-    setup = replace(PROBLEM.setup, scene=Scene.model_validate(scene), accuracy=Accuracy(phases_per_px=1))
-    problem = replace(PROBLEM, setup=setup.with_camera(pixel=Pixel(crosstalk=crosstalk)))
-    check_derivatives(problem, np.full(problem.free.size, 0.4), range(problem.free.size))
-
-
-def test_a_search_in_a_far_scene_stays_below_its_limit() -> None:
-    far = {"target": {"distance_m": 250, "fov_deg": 30}, "optics": {"f_number": 2.0}}
-    setup = replace(PROBLEM.setup, scene=Scene.model_validate(far))
-    problem = replace(PROBLEM, setup=setup)
-    limit = upper_bound_of(problem)
-    assert smooth_csd(setup, limit.curve[None, None], ("yellow", "red"))[0] == pytest.approx(limit.attained, rel=1e-12)
-    assert 0.7 * limit.proven < best_of(problem, 4, 125).objective <= limit.proven
-    assert limit.proven < upper_bound_of(PROBLEM).proven  # blur takes separation away from every filter
-    mixed = replace(problem, setup=setup.with_camera(pixel=Pixel(crosstalk=0.01)))
-    assert reason_without_bound(mixed) == "crosstalk mixes the modified channel into others"
 
 
 def test_worst_case_is_the_smallest_over_the_shifts() -> None:

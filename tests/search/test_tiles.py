@@ -8,21 +8,19 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.integrate import trapezoid
 
 from sweep.camera.exposure import may_be_brightest
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.runs import run_study
-from sweep.search.problem import Problem, best_feasible, starting_points
-from sweep.search.solver import search_from
+from sweep.search.problem import Problem, starting_points
 from sweep.search.tiles import EXCLUDED, SEARCHED, Tiles, search_tiles
 from sweep.search.trade_off import Effort
 from sweep.search.upper_bound import upper_bound_of
 from sweep.study import Study, load_study
 
 from ..build import load
-from .problems import csd_of
+from .problems import best_of, csd_of
 
 TILES = """\
 study: t
@@ -59,10 +57,7 @@ def found(study: Study, levels: tuple[float, ...] = ()) -> tuple[list[Problem], 
 
 def brute_force(problem: Problem, starts: int = 8, evaluations: int = 80) -> float:
     """The best of a search in one tile, as a study of that tile alone makes it."""
-    points = starting_points(problem, starts, 1)
-    best = best_feasible(
-        [e for i, u in enumerate(points) for e in search_from(problem, i, u, "SLSQP", evaluations).log]
-    )
+    best = best_of(problem, starts, evaluations)
     return -np.inf if best is None else best.objective
 
 
@@ -82,13 +77,6 @@ def check_against_brute_force(problems: list[Problem], tiles: Tiles) -> None:
 def test_the_best_of_few_tiles_is_that_of_a_search_in_each(tmp_path: Path, objective: str) -> None:
     study = tiles_study(tmp_path, "R, G, Y", ("chromatic_csd_yellow_red", objective))
     check_against_brute_force(*found(study))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("objective", "light"), [("csd_yellow_red", 0.6), ("chromatic_csd_yellow_red", 0.5)])
-def test_the_best_of_more_tiles_is_that_of_a_search_in_each(tmp_path: Path, objective: str, light: float) -> None:
-    changes = ("min: 0.4", f"min: {light}"), ("chromatic_csd_yellow_red", objective)
-    check_against_brute_force(*found(tiles_study(tmp_path, "R, C, Y, Cy", *changes)))
 
 
 def test_levels_of_light_have_no_better_filter_at_more(tmp_path: Path) -> None:
@@ -124,7 +112,7 @@ def test_of_equal_tiles_the_one_with_more_light_counts(tmp_path: Path) -> None:
 @pytest.mark.parametrize("least", [0.0, 0.5, 0.9])
 @pytest.mark.parametrize("name", ["csd_yellow_red", "chromatic_csd_yellow_red"])
 def test_no_filter_exceeds_a_bound_where_it_sets_the_exposure(tmp_path: Path, name: str, least: float) -> None:
-    """Random and searched filters in clear pixels beside red ones, at their own exposure."""
+    """Searched filters in clear pixels beside red ones, at their own exposure."""
     study = tiles_study(tmp_path, "R, C", ("chromatic_csd_yellow_red", name), ("to: G", "to: 0.05"))
     problem = next(
         p for p, s in zip(problems_of(study), study.search.tiles, strict=True) if s.name == "stopband RRRN(C)"
@@ -140,14 +128,6 @@ def test_no_filter_exceeds_a_bound_where_it_sets_the_exposure(tmp_path: Path, na
         assert proven <= limit.proven + 2e-4  # a tangent is told to 1e-4
         at_level = replace(problem, constraints={"sensitivity": Bound(min=max(level, least))})
         assert brute_force(at_level, 4, 60) <= proven * (1 + 1e-9)
-    if name == "csd_yellow_red":
-        rng, base = np.random.default_rng(4), problem.setup.camera.base_qe[0]
-        wave = np.linspace(0, 1, base.size)
-        for _ in range(300):
-            ends = np.sort(rng.uniform(0, 1, 2 * rng.integers(1, 4)))
-            curve = base * (np.searchsorted(ends, wave) % 2 == rng.integers(2)) * rng.uniform(0.5, 1)
-            if trapezoid(curve) >= max(least, 0.01) * trapezoid(base):
-                assert csd_of(problem.setup, curve[None, None])[0] <= limit.proven * (1 + 1e-9)
 
 
 def test_a_least_sensitivity_below_that_of_others_keeps_their_exposure(tmp_path: Path) -> None:
@@ -170,7 +150,6 @@ def test_a_run_over_tiles_has_its_tables_and_resumes_from_its_own_study(tmp_path
     run_study(study, tmp_path / "out", 1, lambda *_: None)
     tiles = pd.read_parquet(tmp_path / "out" / "tiles.parquet")
     assert len(tiles) == 3 * 8
-    assert set(tiles["status"]) <= {"searched", "excluded", "too dark", "impossible"}
     best = tiles[tiles["best"]]
     assert len(best) == 3
     assert (best["objective"] <= best["upper_bound"] * (1 + 1e-9)).all()

