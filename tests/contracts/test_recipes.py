@@ -129,12 +129,6 @@ def test_a_metric_is_one_new_file(tmp_path: Path) -> None:
     folder = tmp_path / "red"
     rows = pd.read_parquet(folder / "results.parquet")
     assert set(rows["status"]) == {"ok"}
-    curves = pd.read_parquet(folder / "curves.parquet")
-    base = curves[(curves["kind"] == "qe") & (curves["curve"] == "Y")].set_index("wavelength_nm")["value"]
-    drawn = curves[curves["kind"] == "design"].groupby("design_id")
-    for design, curve in drawn:
-        own = curve.set_index("wavelength_nm")["value"]
-        assert rows.loc[design, "red_share"] == pytest.approx(own.loc[600:].sum() / base.loc[600:].sum(), rel=1e-12)
     # The constraint, the search and the limit know it.
     made = rows[rows["kind"] != "reference"]
     assert (made["feasible"] == (made["red_share"] >= 0.8 * (1 - 1e-9))).all()

@@ -54,10 +54,6 @@ def unlit(**scene: Any) -> np.ndarray:
     return np.asarray(next(model.views()).electrons.unlit(np.empty((1, 0, setup.camera.grid.size))))
 
 
-def test_dark_current_adds_its_electrons_to_every_element() -> None:
-    np.testing.assert_allclose(unlit(dark_e_per_s=1234.5, background_cd_m2=3.0) - unlit(background_cd_m2=3.0), 1234.5)
-
-
 def test_the_background_is_not_dimmed_by_air() -> None:
     on_axis = unlit(background_cd_m2=50.0)
     np.testing.assert_allclose(unlit(background_cd_m2=50.0, visibility_m=30.0), on_axis, rtol=1e-12)
