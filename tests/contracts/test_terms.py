@@ -33,9 +33,7 @@ def test_a_code_of_companding_has_the_variance_of_a_uniform_step() -> None:
 
 
 def model_of(**scene: Any) -> Any:
-    made = sweep.make_study(
-        cfas=["RGGB"], pixel={"dark_e_per_s": scene.pop("dark_e_per_s", 0.0), "crosstalk": 0.1}, scenarios={"s": scene}
-    )
+    made = sweep.make_study(cfas=["RGGB"], pixel={"crosstalk": 0.1}, scenarios={"s": scene})
     (space,) = made.study.spaces
     setup = made.study.setup(space, "s").with_all_effects
     return scene_model(setup), setup
