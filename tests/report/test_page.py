@@ -2,17 +2,44 @@
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
 
 from ..conftest import FinishedFolder
-from .pages import needs_browser
 
-pytestmark = needs_browser
+BROWSER = next((p for n in ("chromium", "chromium-browser", "google-chrome") if (p := shutil.which(n))), None)
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium on this machine")
 NAMES = ["stopband", *(pytest.param(name, marks=pytest.mark.slow) for name in ("noise", "paper", "distance"))]
 MOST_WORDS, MOST_FIGURES, MOST_HEIGHT, MOST_BYTES = 1_200, 6, 7_000, 1_500_000
+
+
+class Opened:
+    """An open page, and what it said and asked for."""
+
+    def __init__(self, page: Any, folder: Path) -> None:
+        self.page = page
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        page.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on("dialog", lambda dialog: self.errors.append(f"dialog {dialog.message}") or dialog.dismiss())
+        page.on("request", lambda request: self.requests.append(request.url))
+        page.goto((folder / "report.html").as_uri())
+
+
+@pytest.fixture(scope="module")
+def opened() -> Iterator[Callable[[Path], Opened]]:
+    """Opens the report of a folder."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield lambda folder: Opened(browser.new_page(viewport={"width": 1440, "height": 900}), folder)
+        browser.close()
 
 
 def counted(page: Any) -> tuple[int, int, int]:
@@ -23,7 +50,7 @@ def counted(page: Any) -> tuple[int, int, int]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_report_is_read_in_minutes(finished: FinishedFolder, opened: Any, name: str) -> None:
+def test_a_report_is_read_in_minutes(finished: FinishedFolder, opened: Callable[[Path], Opened], name: str) -> None:
     seen = opened(finished(name))
     words, figures, height = counted(seen.page)
     assert words <= MOST_WORDS
@@ -36,7 +63,7 @@ def test_a_report_is_read_in_minutes(finished: FinishedFolder, opened: Any, name
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_is_cut_on_a_phone(finished: FinishedFolder, opened: Any, name: str) -> None:
+def test_nothing_is_cut_on_a_phone(finished: FinishedFolder, opened: Callable[[Path], Opened], name: str) -> None:
     seen = opened(finished(name))
     seen.page.set_viewport_size({"width": 400, "height": 800})
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= 400
@@ -47,12 +74,11 @@ def test_nothing_is_cut_on_a_phone(finished: FinishedFolder, opened: Any, name: 
     assert min(heights) >= 9.5
 
 
-def test_the_explorer_links_its_views(finished: FinishedFolder, opened: Any) -> None:
+def test_the_explorer_links_its_views(finished: FinishedFolder, opened: Callable[[Path], Opened]) -> None:
     """A click takes the nearest design, sorting and ranges change the rows, and each number is that of the table."""
     seen = opened(finished("stopband"))
     page, rows = seen.page, pd.read_parquet(finished("stopband") / "results.parquet")
     assert page.locator("#explorer .shown").inner_text().startswith("best stopband: ")
-    first = page.locator("#explorer tbody tr").first
     page.locator("#explorer tbody tr").nth(3).click()
     shown = page.locator("#explorer .shown").inner_text()
     name = shown.partition(":")[0]
@@ -61,11 +87,8 @@ def test_the_explorer_links_its_views(finished: FinishedFolder, opened: Any) -> 
     assert page.locator("#explorer tr.on th").inner_text() == name
     page.locator("#explorer th[data-by='0']").click(position={"x": 60, "y": 5})
     assert page.locator("#explorer th[data-by='0']").inner_text().split("\n")[0].endswith("▲")
-    assert first.inner_text() != ""
     page.locator("#explorer th[data-by='0'] input").first.fill("200")
     page.locator("#explorer th[data-by='0'] input").first.press("Enter")
     kept = [float(text) for text in page.locator("#explorer tbody td:nth-child(2)").all_inner_texts()]
     assert min(kept) >= 200
-    box = page.locator("#explorer svg circle").first.bounding_box()
-    page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     assert seen.errors == []

@@ -12,15 +12,15 @@ import numpy as np
 import openpyxl
 import pytest
 
-import sweep
 from sweep.base.errors import DataError
+from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
 from sweep.spectra.builtin.task_sets import illuminant
 from sweep.spectra.formats import read_curves
 from sweep.spectra.spectrum import Quantity, WavelengthGrid
 from sweep.spectra.units import Use, unit_of, used_as
 from sweep.study import load_study
 
-from ..build import one_line
+from ..build import load, one_line
 from ..cases import thinned
 from ..commanded import commanded
 from ..watchdog import within
@@ -67,7 +67,7 @@ class Written:
     unit: str
 
 
-def table(rng: np.random.Generator) -> Written:  # noqa: PLR0912, PLR0915  (choices one after the other)
+def table(rng: np.random.Generator) -> Written:
     """A table in a layout of its own, from a writer that knows nothing of the reader."""
     use: Use = ("sensor", "filter", "light")[rng.integers(3)]
     step = int(rng.choice([1, 2, 5, 10]))
@@ -79,7 +79,7 @@ def table(rng: np.random.Generator) -> Written:  # noqa: PLR0912, PLR0915  (choi
     numbers = in_unit(unit, right, nm[:, None])
     if unit == "counts":
         right = numbers
-    mark = str(rng.choice([",", ";", "\t", "|", "   "]))
+    mark = str(rng.choice([",", ";", "\t", "|"]))
     decimal = "," if rng.integers(2) and mark != "," else "."
     of_wave, scale = [("nm", 1.0), ("nm", 1.0), ("um", 1e-3)][rng.integers(3)]
 
@@ -88,13 +88,8 @@ def table(rng: np.random.Generator) -> Written:  # noqa: PLR0912, PLR0915  (choi
         return text.replace(".", decimal)
 
     names = list(NAMES[use][rng.integers(len(NAMES[use]))][:count])
-    if mark == "   ":
-        names = [name.replace(" ", "_") for name in names]
-    place = str(rng.choice(["head", "row", "title"])) if unit else "none"
-    heads = [f"{name} [{unit}]" if place == "head" else name for name in names]
+    heads = [f"{name} [{unit}]" if unit else name for name in names]
     layout = str(rng.choice(["down", "down", "along", "pairs"]))
-    if mark == "   " and layout == "pairs":
-        layout = "down"
     order = np.arange(nm.size)
     if layout != "along":
         order = (order, order[::-1], rng.permutation(nm.size))[rng.integers(3)]
@@ -102,15 +97,10 @@ def table(rng: np.random.Generator) -> Written:  # noqa: PLR0912, PLR0915  (choi
     columns = [[cell(value) for value in numbers[order, at]] for at in range(count)]
     lines: list[list[str]] = []
     word = str(rng.choice(["Wavelength", "wavelength", "Wellenlänge", "lambda", "WL"]))
-    first = of_wave if layout == "along" or (place != "row" and rng.integers(3) == 0) else f"{word} ({of_wave})"
-    if mark == "   ":
-        first = first.replace(" ", "_")
-        heads = [head.replace(" ", "_") for head in heads]
+    first = of_wave if layout == "along" or rng.integers(3) == 0 else f"{word} ({of_wave})"
     if layout == "along":
-        first, words = ("lamp", "name", "", of_wave)[rng.integers(4)], int(rng.integers(3))
-        waves = [
-            f"{value:g}".replace(".", decimal) + ("" if mark == "   " else ("", " nm", "[nm]")[words]) for value in nm
-        ]
+        first, after = ("lamp", "name", "", of_wave)[rng.integers(4)], ("", " nm", "[nm]")[rng.integers(3)]
+        waves = [f"{value:g}{after}" for value in nm]
         lines = [[first, *waves], *([head, *column] for head, column in zip(heads, columns, strict=True))]
     elif layout == "pairs":
         if rng.integers(2):
@@ -123,28 +113,15 @@ def table(rng: np.random.Generator) -> Written:  # noqa: PLR0912, PLR0915  (choi
             for w, row in zip(waves, zip(*columns, strict=True), strict=True)
         ]
     else:
-        lines = [[first, *heads]]
-        if place == "row":
-            lines.append([of_wave, *[unit] * count])
-            lines[0][0] = word
-        lines += [[w, *row] for w, row in zip(waves, zip(*columns, strict=True), strict=True)]
+        lines = [[first, *heads], *([w, *row] for w, row in zip(waves, zip(*columns, strict=True), strict=True))]
         if rng.integers(6) == 0:
-            lines = (
-                [["" if at == 0 else str(at - 1), *line] for at, line in enumerate(lines)] if place != "row" else lines
-            )
-    if place == "row" and layout != "down":
-        place = "title"
+            lines = [["" if at == 0 else str(at - 1), *line] for at, line in enumerate(lines)]
     text = [mark.join(line) for line in lines]
     if rng.integers(5) == 0:
-        text = [line + mark for line in text] if mark.strip() else text
-    before = [f"measured values, unit: {unit}"] if place == "title" else []
-    before += [["# note"], ["report of lamp 7"], [""], []][rng.integers(4)]
+        text = [line + mark for line in text]
+    before = [["# note"], ["report of lamp 7"], [""], []][rng.integers(4)]
     joined = ("\r\n", "\n")[rng.integers(2)].join([*before, *text, ""])
     return Written(joined, use, nm, right, unit)
-
-
-def close(found: np.ndarray, right: np.ndarray) -> bool:
-    return bool(np.abs(found - right).max() <= 1e-6 * np.abs(right).max())
 
 
 def reads_back(path: Path, written: Written) -> bool:
@@ -152,33 +129,28 @@ def reads_back(path: Path, written: Written) -> bool:
     try:
         curves = read_curves(path)
         made = used_as(curves, list(curves.values), written.use)
-    except DataError as error:
-        assert all(len(str(issue).splitlines()) == 1 for issue in error.issues)  # noqa: PT017
+    except DataError:
         return False
     found = np.stack([np.interp(written.wave_nm, *made.samples(name)) for name in made.values], axis=1)
     assert found.shape == written.values.shape, written.text[:600]
-    assert close(found, written.values), (made.notes, written.unit, written.text[:600])
-    for name in made.values:
-        quantity = made.units[name].quantity
-        if written.use == "light":
-            assert quantity == ("photons" if written.unit.startswith(("photon", "count")) else "energy")
+    off = np.abs(found - written.values).max()
+    assert off <= 1e-6 * np.abs(written.values).max(), (made.notes, written.unit, written.text[:600])
+    if written.use == "light":
+        quantity = "photons" if written.unit.startswith(("photon", "count")) else "energy"
+        assert {made.units[name].quantity for name in made.values} == {quantity}
     return True
 
 
 @pytest.mark.parametrize("seed", thinned(range(4), 4))
 def test_of_a_thousand_layouts_none_is_another_number(tmp_path: Path, seed: int) -> None:
-    rng, read = np.random.default_rng([11, seed]), 0
-    refused: dict[str, int] = {}
+    rng, read = np.random.default_rng([12, seed]), 0
     for number in range(250):
         written = table(rng)
         path = tmp_path / f"a.{('csv', 'txt', 'dat')[number % 3]}"
         encoding = str(rng.choice(["utf-8", "utf-8-sig", "utf-16", "latin-1", "utf-16-le"]))
         path.write_bytes(written.text.encode(encoding, "replace"))
-        ok = reads_back(path, written)
-        read += ok
-        if not ok:
-            refused[written.unit] = refused.get(written.unit, 0) + 1
-    assert read > 212, refused
+        read += reads_back(path, written)
+    assert read > 212
 
 
 MEANINGS = """
@@ -398,12 +370,6 @@ INSTRUMENTS: dict[str, tuple[str, str, Use, dict[str, np.ndarray]]] = {
     "Perkin-Elmer": ("notch.asc", PERKIN_ELMER, "filter", {"notch": T}),
     "Specwin": ("a.isd", SPECWIN, "light", {"TL red": LED}),
     "CS-2000": ("a.csv", CS_2000, "light", {"TL red 2026/11/26": LED, "TL dim 2026/11/26": LED / 10}),
-    "German": (
-        "a.csv",
-        GERMAN,
-        "sensor",
-        dict(zip(("QE Rot [%]", "QE Grün [%]", "QE Blau [%]", "QE Klar [%]"), QE.values(), strict=True)),
-    ),
     "Sekonic": ("a.csv", SEKONIC, "light", {"TL red": LED}),
     "IES": ("a.spdx", SPDX, "light", {"TL red": LED}),
     "rawtoaces": (
@@ -418,7 +384,7 @@ INSTRUMENTS: dict[str, tuple[str, str, Use, dict[str, np.ndarray]]] = {
 @pytest.mark.parametrize("name", INSTRUMENTS)
 def test_a_file_of_an_instrument_is_read_as_it_means(tmp_path: Path, name: str) -> None:
     file, text, use, right = INSTRUMENTS[name]
-    (tmp_path / file).write_text(text, encoding="latin-1" if name == "German" else "utf-8")
+    (tmp_path / file).write_text(text)
     curves = read_curves(tmp_path / file)
     made = used_as(curves, list(curves.values), use)
     assert list(made.values) == list(right)
@@ -443,7 +409,6 @@ def test_a_spreadsheet_is_read_from_its_first_sheet_with_a_table(tmp_path: Path)
     made = used_as(curves, list(curves.values), "sensor")
     for found, right in zip(made.values.values(), QE.values(), strict=True):
         np.testing.assert_allclose(found, right, rtol=1e-8)
-    assert "sheet 'QE' of a spreadsheet" in curves.notes
 
 
 def test_digitized_pairs_keep_their_own_wavelengths_and_doubles_are_averaged(tmp_path: Path) -> None:
@@ -460,46 +425,17 @@ def test_digitized_pairs_keep_their_own_wavelengths_and_doubles_are_averaged(tmp
 
 
 @pytest.mark.parametrize(
-    ("head", "top", "use", "stated", "said"),
-    [
-        ("R", 4.03, "sensor", None, "values up to 4.03 are no QE"),
-        ("R [%]", 0.6, "sensor", None, "values in percent, but none is above 1"),
-        ("T", 0.6, "sensor", None, "transmission is no QE"),
-        ("R (A/W)", 6.0, "sensor", None, "its largest QE would be"),
-        ("Relative Response", 0.6, "sensor", None, "the head does not tell its quantity"),
-        ("Relative Response", 0.6, "sensor", "qe", ""),
-        ("OD", 0.6, "filter", "transmission", ""),
-        ("dB", 3.0, "filter", None, "its largest transmission would be"),
-    ],
+    ("head", "use", "stated"), [("Relative Response", "sensor", "qe"), ("OD", "filter", "transmission")]
 )
-def test_an_unknown_or_contradicting_unit_is_refused_or_stated(
-    tmp_path: Path, head: str, top: float, use: Use, stated: Quantity | None, said: str
-) -> None:
-    (tmp_path / "a.csv").write_text(f"nm,{head}\n400,{top / 2}\n550,{top}\n700,{top / 3}\n")
+def test_a_quantity_that_is_stated_counts(tmp_path: Path, head: str, use: Use, stated: Quantity) -> None:
+    (tmp_path / "a.csv").write_text(f"nm,{head}\n400,0.3\n550,0.6\n700,0.2\n")
     curves = read_curves(tmp_path / "a.csv")
-    if said:
-        with one_line(said):
-            used_as(curves, [head], use, stated)
-    else:
-        assert used_as(curves, [head], use, stated).samples(head)[1].max() == top
-
-
-@pytest.mark.parametrize(("head", "density", "right"), [("OD", 4.0, 234.1), ("Absorbance", 0.9, 166.1)])
-def test_a_notch_in_optical_density_is_judged_as_its_transmission(
-    tmp_path: Path, head: str, density: float, right: float
-) -> None:
-    nm = np.arange(400.0, 701)
-    od = (0.03 if density > 1 else 0.02) + density * np.exp(-(((nm - 633) / 8) ** 2))
-    (tmp_path / "notch.csv").write_text(rows([["Wavelength (nm)", *nm], [head, *(f"{v:.4f}" for v in od)]]))
-    for options in ({"relative_to": "Y"}, {}):
-        found = sweep.evaluate(tmp_path / "notch.csv", **options)
-        assert float(found.table.iloc[-1]["csd_yellow_red"]) == pytest.approx(right, abs=0.06)
-        assert "optical density, converted to transmission, times Y" in str(found)
+    assert list(used_as(curves, [head], use, stated).samples(head)[1]) == [0.3, 0.6, 0.2]
 
 
 def test_a_folder_of_one_file_each_is_a_sensor_and_lights(tmp_path: Path) -> None:
-    """`describe`, `new`, `run` and `evaluate`."""
-    for folder in ("qe", "leds", "filters"):
+    """`new` and `evaluate`."""
+    for folder in ("qe", "leds"):
         (tmp_path / folder).mkdir()
     for name, values in QE.items():
         (tmp_path / "qe" / f"{name}.csv").write_text(rows([["nm", *NM], ["QE", *ppf(values)]]))
@@ -507,19 +443,14 @@ def test_a_folder_of_one_file_each_is_a_sensor_and_lights(tmp_path: Path) -> Non
     for name, peak in (("go", 505), ("wait", 592), ("stop", 632)):
         spectrum = rows([fine, ppf(np.exp(-(((fine - peak) / 12) ** 2)))], "\t")
         (tmp_path / "leds" / f"{name}.txt").write_text(OCEAN.split("380.0\t")[0] + spectrum)
-    (tmp_path / "filters" / "notch.asc").write_text(PERKIN_ELMER)
+    (tmp_path / "notch.asc").write_text(PERKIN_ELMER)
     own = ("--lights", tmp_path / "leds")
     for words, said in (
-        (("describe", tmp_path / "qe", "--output", tmp_path), "4 curves: Blue, Clear, Green, Red."),
         (("new", "mine", "--qe", tmp_path / "qe", *own, "--folder", tmp_path), "Next: "),
-        (
-            ("evaluate", tmp_path / "filters", "--sensor", tmp_path / "qe", *own),
-            "transmission, times C; it is N of RGBN",
-        ),
+        (("evaluate", tmp_path / "notch.asc", "--sensor", tmp_path / "qe", *own), "transmission, times C"),
     ):
         code, out, err = commanded(*words)
-        assert (code, err) == (0, "")
-        assert said in out
+        assert (code, err, said in out) == (0, "", True)
     study = load_study(tmp_path / "mine.yaml")
     np.testing.assert_allclose(study.sensor.qe["R"], np.interp(study.grid.nodes_nm, NM, QE["Red"]), atol=1e-6)
     named = {kind: study.lights.names[at[0]] for kind, at in study.lights.members.items()}
@@ -531,11 +462,6 @@ def test_words_of_three_languages_are_channels(tmp_path: Path) -> None:
     code, out, _ = commanded("new", "mine", "--qe", tmp_path / "a.csv", "--folder", tmp_path)
     assert code == 0
     assert "R from QE Rot [%], G from QE Grün [%], B from QE Blau [%], Y from QE Gelb [%]" in out
-    unknown = GERMAN.replace("Rot", "x1").replace("Blau", "x2").replace("Klar", "x3")
-    (tmp_path / "b.csv").write_text(unknown, encoding="utf-8")
-    code, _, err = commanded("new", "other", "--qe", tmp_path / "b.csv", "--folder", tmp_path)
-    assert code == 2
-    assert "only G was understood (got 'QE x1 [%], QE x2 [%], QE x3 [%]')" in err
 
 
 def test_a_study_with_own_ir_cut_runs_to_1000_nm_with_built_in_lights(tmp_path: Path) -> None:
@@ -543,28 +469,21 @@ def test_a_study_with_own_ir_cut_runs_to_1000_nm_with_built_in_lights(tmp_path: 
     broad, cut = 0.5 * np.exp(-(((nm - 600) / 200.0) ** 2)), np.where(nm < 690, 0.9, 0.01)
     (tmp_path / "qe.csv").write_text(rows([["nm", *nm], *([f"{name} QE", *broad] for name in ("R", "C"))]))
     (tmp_path / "cut.csv").write_text(rows([["nm", *nm], ["%T", *(100 * cut)]]))
-    text = (
+    study = load(
+        tmp_path,
         "study: ir\nsensor: {files: [{file: qe.csv, columns: {R: R QE, C: C QE}}], clear: C, ir_cut: cut.csv}\n"
-        "wavelengths: {start_nm: 400, stop_nm: 1000}\nlights: {builtin: tl16, outside: zero}\ncfas: [RCCC]\n"
+        "wavelengths: {start_nm: 400, stop_nm: 1000}\nlights: {builtin: tl16, outside: zero}\ncfas: [RCCC]\n",
     )
-    (tmp_path / "ir.yaml").write_text(text)
-    study = load_study(tmp_path / "ir.yaml")
     nodes = study.grid.nodes_nm
     expected = np.interp(nodes, nm, cut) * np.interp(nodes, nm, broad)
     np.testing.assert_allclose(study.sensor.qe["C"], expected, rtol=1e-9)
-    short = sweep.make_study(lights="tl16", cfas=["RGGB"]).study.lights.photons
+    short = BUILT_IN_LIGHTS["tl16"](WavelengthGrid()).photons
     np.testing.assert_array_equal(study.lights.photons[:, nodes <= 700], short)
     assert not study.lights.photons[:, nodes > 700].any()
-    (tmp_path / "ir.yaml").write_text(text.replace("{builtin: tl16, outside: zero}", "tl16"))
-    with one_line("the built-in curves end before the grid"):
-        load_study(tmp_path / "ir.yaml")
 
 
 def test_daylight_and_filament_go_on_to_1000_nm() -> None:
-    long, short = (
-        WavelengthGrid(start_nm=400, stop_nm=1000, step_nm=5),
-        WavelengthGrid(start_nm=400, stop_nm=780, step_nm=5),
-    )
+    long, short = (WavelengthGrid(start_nm=400, stop_nm=nm, step_nm=5) for nm in (1000, 780))
     for name, kelvin in (("d65", 6504.0), ("a", 2855.54)):
         photons = illuminant(long, name)
         np.testing.assert_array_equal(photons[: short.size], illuminant(short, name))
@@ -586,6 +505,7 @@ NM31 = np.arange(400, 701, 10)
 SHARE = 0.05 + 0.85 / (1 + np.exp(-(NM31 - 580) / 12.0))
 PER_W = SHARE * NM31 * 1e-9 * E_C / (H * C)
 OD31 = -np.log10(SHARE)
+JASCO = "TITLE\tx\nXUNITS\tAXIS\nYUNITS\t%T\nMINY\t5\nXYDATA\n" + down("", 100 * SHARE, mark="\t").lstrip()
 STACKED = "x,y\n" + "".join(f"{w + shift},{v:.5f}\n" for shift in (0, 1.3) for w, v in zip(NM31, SHARE, strict=True))
 # Text, use, and which column has the share above, or the words of the refusal.
 TRAPS: dict[str, tuple[str, Use, int | str]] = {
@@ -594,35 +514,23 @@ TRAPS: dict[str, tuple[str, Use, int | str]] = {
     "comment": (down("nm,R", PER_W, before="# all values in A/W, measured 2023\n"), "sensor", 0),
     "Data line": (down("Data\nWavelength (nm),R", PER_W, before="Responsivity (A/W)\n"), "sensor", 0),
     "two heads": (down(",T (%),OD\nWavelength (nm),BP550,BP600", 100 * SHARE, OD31), "filter", 1),
-    "title in percent": (
-        down("Wavelength (nm),ND", SHARE / 1.5, before="Transmission in %\n"),
-        "filter",
-        "none is above 1",
-    ),
+    "title in percent": (down("nm,ND", SHARE / 1.5, before="Transmission in %\n"), "filter", "none is above 1"),
     "T beside OD": (down("nm,Transmission,OD", SHARE, OD31 * 9), "filter", 0),
     "QE beside A/W": (down("nm,QE,SR (mA/W)", SHARE, 1e3 * PER_W), "sensor", 1),
     "neutral density": (down("nm,F1", SHARE, before="Neutral density filters\n"), "filter", 0),
+    "along in THz": (f"Frequency THz,{','.join(map(str, NM31))}\nR{',0.5' * 31}\n", "sensor", "something else"),
+    "transmission": (down("nm,T", SHARE), "sensor", "transmission is no QE"),
+    "A/W of too much": (down("nm,R (A/W)", 9 * PER_W), "sensor", "its largest QE would be"),
+    "gain": (down("nm,dB", 3 * SHARE), "filter", "its largest transmission would be"),
     "per mille": (down("nm,T (‰)", 1e3 * SHARE), "filter", "has an unknown unit"),
     "relative response": (down("nm,R", SHARE, before="Relative Response of the sensor\n"), "sensor", "does not tell"),
     "loss": (down("nm,Loss (%)", 100 * SHARE), "filter", "does not tell its quantity"),
     "A": (down("nm, A", OD31 / 2), "filter", "absorbance, or a name?"),
     "dense": (down("nm,209 OD", 100 * SHARE), "filter", "are no optical density"),
     "wavenumbers": (down("Wavelength,T\ncm-1,%", 100 * SHARE), "filter", "wavelengths in an unknown unit"),
-    "Raman": (
-        down("Wavelength,T", SHARE, before="XAxis mode: Raman Shifts\n"),
-        "filter",
-        "something else than wavelengths",
-    ),
-    "JASCO": (
-        "TITLE\tx\nXUNITS\tNANOMETERS\nYUNITS\t%T\nMINY\t5\nXYDATA\n" + down("", 100 * SHARE, mark="\t").lstrip(),
-        "filter",
-        0,
-    ),
-    "JASCO cm-1": (
-        "TITLE\tx\nXUNITS\t1/CM\nYUNITS\t%T\nXYDATA\n" + down("", 100 * SHARE, mark="\t").lstrip(),
-        "filter",
-        "something else",
-    ),
+    "Raman": (down("Wavelength,T", SHARE, before="XAxis mode: Raman Shifts\n"), "filter", "something else"),
+    "JASCO": (JASCO.replace("AXIS", "NANOMETERS"), "filter", 0),
+    "JASCO cm-1": (JASCO.replace("AXIS", "1/CM"), "filter", "something else"),
     "along with a unit": (
         "Responsivity (A/W)," + ",".join(map(str, NM31)) + "\nR," + ",".join(f"{v:.6g}" for v in PER_W) + "\n",
         "sensor",
@@ -633,30 +541,13 @@ TRAPS: dict[str, tuple[str, Use, int | str]] = {
         "sensor",
         0,
     ),
-    "along in THz": (
-        "Frequency THz," + ",".join(map(str, NM31)) + "\nR," + "0.5," * 30 + "0.5\n",
-        "sensor",
-        "something else",
-    ),
     "decimal comma among points": ("nm;R\n400;0,6\n500;0.5\n700;0.1\n", "sensor", "not a usable number (got '0,6')"),
-    "commas for thousands": (
-        "nm;R\n400;1,234\n500;2,345\n700;3,456\n",
-        "sensor",
-        "a comma may be a decimal mark or part every three digits",
-    ),
+    "commas for thousands": ("nm;R\n400;1,234\n500;2,345\n700;3,456\n", "sensor", "a comma may be a decimal mark"),
     "two tables": ("nm,R\n400,1\n500,2\n\nsecond\n400,1\n500,2\n510,3\n", "sensor", "two tables in one file"),
     "some in percent": ("nm,R\n400,10 %\n500,20\n700,30\n", "sensor", "some values have percent signs"),
     "stacked": (STACKED, "sensor", "wavelengths begin again"),
-    "points for thousands": (
-        "nm;led\n450;987\n500;1.001\n600;1.250\n650;999\n",
-        "light",
-        "a point may be a decimal mark",
-    ),
-    "overflow": (
-        "nm,E\n400,9.9999E+30\n500,1\n600,2\n",
-        "light",
-        "not a usable number",
-    ),
+    "points for thousands": ("nm;led\n450;987\n500;1.001\n600;1.250\n650;999\n", "light", "a point may be a decimal"),
+    "overflow": ("nm,E\n400,9.9999E+30\n500,1\n600,2\n", "light", "not a usable number"),
     "energies": ("1.8,0.5\n2.2,0.6\n3.1,0.2\n", "sensor", "um, or energies in eV"),
     "two lists": (
         "".join(f"Spectral Data {w}[nm],{0.5}\n" for w in range(380, 781, 5))
@@ -667,9 +558,7 @@ TRAPS: dict[str, tuple[str, Use, int | str]] = {
         "light",
         0,
     ),
-    "row counter alone": ("400,1\n500,2\n600,3\n", "light", -1),
     "long heads": ("a" + "_" * 5000 + "1,x\n400,1\n500,2\n600,3\n", "sensor", "no column wavelength"),
-    "row names of R": ("wavelength R\n1 400 0.1\n2 410 0.2\n3 420 0.3\n", "sensor", -1),
 }
 
 
@@ -685,9 +574,8 @@ def test_a_trap_is_read_as_meant_or_refused(tmp_path: Path, name: str) -> None:
             return
         curves = read_curves(tmp_path / "file.txt")
         made = used_as(curves, list(curves.values), use)
-    if right >= 0:
-        found = np.interp(NM31, *made.samples(list(made.values)[right]))
-        np.testing.assert_allclose(found, SHARE, rtol=2e-5 if use != "light" else 1e-3)
+    found = np.interp(NM31, *made.samples(list(made.values)[right]))
+    np.testing.assert_allclose(found, SHARE, rtol=2e-5 if use != "light" else 1e-3)
 
 
 def test_curves_of_two_lengths_end_where_they_end(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.spectra.builtin import spectra, surrogate_spectra, task_sets
-from sweep.spectra.color import chromaticity, corners
+from sweep.spectra.color import chromaticity
 from sweep.spectra.spectrum import WavelengthGrid
 from sweep.spectra.tasks import SHIPPED
 
@@ -34,14 +34,6 @@ def test_every_set_has_the_digest_that_its_card_was_written_with() -> None:
     told = json.loads(pq.read_schema(OUT).metadata[b"cards"])
     cards = {card.name: card for card in spectra.cards()}
     assert {name: card.sha256 for name, card in cards.items()} == {name: own["sha256"] for name, own in told.items()}
-    assert sum(cards["earthlib"].groups.values()) <= 300
-    assert cards["cie_test_colors"].groups == {"cie_test_colors": 99}
-    assert cards["training_reflectances"].groups == {"training_reflectances": 190}
-    assert all(
-        card.source and card.license and card.credit for card in (*cards.values(), *surrogate_spectra.surrogate_cards())
-    )
-    changed = spectra.shipped_groups()["colorchecker"]
-    assert spectra.numbers_digest(changed[:-1]) != cards["colorchecker"].sha256
 
 
 @pytest.mark.parametrize("group", list(surrogate_spectra.SURROGATES))
@@ -49,14 +41,6 @@ def test_a_surrogate_lies_inside_its_color_region(group: str) -> None:
     light = task_sets.illuminant(GRID, "d65") if surrogate_spectra.is_sheeting(group) else 1.0
     xy = chromaticity(GRID, task_sets.spectra_of_group(GRID, group) * light)
     assert (surrogate_spectra.region(group).violation(xy) <= 0).all()
-
-
-def test_corners_bound_their_polygon() -> None:
-    square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
-    for points in (square, square[::-1]):
-        region = corners(*points, source="")
-        inside = region.violation(np.array([[0.5, 0.5], [0.01, 0.99], [1.2, 0.5], [0.5, -0.1]])) <= 0
-        assert inside.tolist() == [True, True, False, False]
 
 
 def test_white_lamps_of_the_task_are_white() -> None:
@@ -79,5 +63,4 @@ def test_a_task_has_equal_photons_or_one_lux(name: str) -> None:
         assert len(one) == (sizes.sum() ** 2 - (sizes**2).sum()) / 2
         assert (kinds[one] != kinds[other]).all()
     if task.chart is not None:
-        assert task.chart.photons.shape[1] == 24
         np.testing.assert_allclose(task.chart.white[:, 1], 1, rtol=1e-12)

@@ -52,40 +52,23 @@ def test_a_new_study_fits_the_schema(tmp_path: Path) -> None:
     assert errors(Document(made(tmp_path)).data) == []
 
 
-SMALL: dict[str, Any] = {"study": "a", "sensor": "ar0820", "lights": "tl16", "cfas": ["RGGB"]}
-NEAR = {"target": {"fov_deg": 60}}
-FILTER = {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": "G"}
-
-
 @pytest.mark.parametrize(
-    "more",
+    ("more", "fits"),
     [
-        {"cfas": {"RGGB": None, "RGBW": {"tile": [["R", "G"], ["B", "W"]]}}},
-        {"scenarios": {"a": {"noise": True}, "b": {"noise": {"read_noise_e": 1}}, "c": {"noise": False}}},
-        {"scenarios": {"road": NEAR | {"each": {"target.distance_m": {"min": 1, "max": 9, "count": 3}}}}},
-        {"sweeps": {"x": FILTER | {"grid": {"left_nm": 600, "right_nm": [640, 650], "depth": {"values": [1]}}}}},
-        {"boxes": {"x": FILTER | {"channel": ["Na", "Nb"], "to": 0.1, "box": {"left_nm": {"min": 1, "max": 2}}}}},
-        {"objective": {"sum": {"csd_yellow_red": 2}}},
-        {"sensor": "of_a_package"},
+        ({"cfas": {"RGGB": None, "RGBW": {"tile": [["R", "G"], ["B", "W"]]}}}, True),
+        ({"scenarios": {"a": {"noise": True}, "b": {"noise": {"read_noise_e": 1}}, "c": {"noise": False}}}, True),
+        ({"objective": {"sum": {"csd_yellow_red": 2}}}, True),
+        ({"sensor": "of_a_package"}, True),
+        ({"sensr": "ar0820"}, False),
+        ({"scenarios": {"x": {"target": {"fov_deg": 60}}}}, False),
+        ({"scenarios": {"x": {"each": {"exposure.level": "0.5"}}}}, False),
+        ({"tolerance_dn": "0.1"}, False),
+        ({"objective": {"minimun": {"csd_yellow_red": 1}}}, False),
     ],
 )
-def test_short_forms_fit_the_schema(more: dict[str, Any]) -> None:
-    assert errors(SMALL | more) == []
-
-
-@pytest.mark.parametrize(
-    "more",
-    [
-        {"sensr": "ar0820"},
-        {"scenarios": {"x": {"nois": True}}},
-        {"scenarios": {"x": NEAR}},
-        {"scenarios": {"x": {"each": {"exposure.level": "0.5"}}}},
-        {"tolerance_dn": "0.1"},
-        {"objective": {"minimun": {"csd_yellow_red": 1}}},
-    ],
-)
-def test_misspelled_keys_do_not_match_the_schema(more: dict[str, Any]) -> None:
-    assert errors(SMALL | more)
+def test_short_forms_fit_the_schema_and_misspelled_keys_do_not(more: dict[str, Any], fits: bool) -> None:
+    small = {"study": "a", "sensor": "ar0820", "lights": "tl16", "cfas": ["RGGB"]}
+    assert (errors(small | more) == []) == fits
 
 
 def test_studies_are_listed_with_the_broken_ones(tmp_path: Path) -> None:
@@ -94,16 +77,9 @@ def test_studies_are_listed_with_the_broken_ones(tmp_path: Path) -> None:
     (tmp_path / "worse.yml").write_text("[")
     lines = list_studies(tmp_path, output=tmp_path / "out").lines
     assert [line.split()[0] for line in lines] == ["broken", "tiny", "worse", "3"]
-    assert "cannot be loaded" in lines[0]
     assert "sensr: unknown key" in lines[0]
     assert "not run" in lines[1]
-    assert "3 studies, 0 finished" in lines[3]
     assert not (tmp_path / "out").exists()
-
-
-def test_a_missing_or_empty_folder_is_reported(tmp_path: Path) -> None:
-    assert commanded("list", tmp_path / "none")[0] == 2
-    assert "No studies" in list_studies(tmp_path, output=tmp_path).lines[0]
 
 
 def test_an_interrupted_and_a_changed_run_are_reported(tmp_path: Path) -> None:
@@ -130,32 +106,16 @@ def test_the_shell_completes_studies_and_runs(tmp_path: Path, monkeypatch: pytes
         (tmp_path / name).touch()
     monkeypatch.chdir(tmp_path)
     assert study_files("st") == ["studies/[x].yaml", "studies/one.yaml", "studies/two.yml"]
-    assert study_files("studies/o") == ["studies/one.yaml"]
     assert study_files("studies/[") == ["studies/[x].yaml"]
-    assert study_files("nothing") == []
     assert run_folders("") == run_folders("outputs/") == ["outputs/one"]
     requested = {"_SWEEP_COMPLETE": "complete_bash", "COMP_WORDS": "sweep run studies/t", "COMP_CWORD": "2"}
-    assert shell(requested).splitlines() == ["studies/two.yml"]
-
-
-def shell(environment: dict[str, str]) -> str:
-    whole = os.environ | {"PYTHONPATH": str(STUDIES.parent)} | environment
+    whole = os.environ | {"PYTHONPATH": str(STUDIES.parent)} | requested
     command = [sys.executable, "-m", "sweep"]
-    return subprocess.run(command, env=whole, capture_output=True, text=True, check=True).stdout
-
-
-@pytest.mark.parametrize(
-    ("kind", "word"), [("bash", "complete -o default"), ("zsh", "#compdef sweep"), ("fish", "complete")]
-)
-def test_completion_scripts_are_made_without_a_terminal(kind: str, word: str) -> None:
-    script = shell({"_SWEEP_COMPLETE": f"source_{kind}"})
-    assert word in script
-    assert "_SWEEP_COMPLETE=complete" in script
+    said = subprocess.run(command, env=whole, capture_output=True, text=True, check=True).stdout
+    assert said.splitlines() == ["studies/two.yml"]
 
 
 def test_help_imports_nothing_heavy() -> None:
     code = "import sys, sweep.cli.app\ntry: sweep.cli.app.app(['--help'])\nexcept SystemExit: pass\nprint(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    for command in ("run", "describe", "new", "list", "schema"):
-        assert f" {command} " in done.stdout
     assert not set(HEAVY) & set(done.stderr.split())

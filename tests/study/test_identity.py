@@ -16,6 +16,7 @@ from sweep.base.errors import StudyError
 from sweep.results.identity import fingerprint
 from sweep.study import load_study
 
+from ..curve_texts import WAVE, bell, csv
 from ..whole_study import WHOLE
 
 Path_ = tuple[Any, ...]
@@ -80,7 +81,6 @@ def test_every_number_of_a_study_is_in_its_fingerprint(tmp_path: Path, group: in
         assert fingerprint(load_study(written(tmp_path, with_leaf(WHOLE, text, "else")))) == first
 
 
-WAVE = np.arange(400, 701, 5)
 CODE = "def apart(readings):\n    return readings.of('yellow')[:, :, 0] - readings.of('red')[:, :1, 0]\n\napart.unit, apart.label = 'DN', 'gap'\n"
 STUDY = """\
 study: files
@@ -97,42 +97,21 @@ metrics: [own.py:apart]
 """
 
 
-def file_texts() -> dict[str, str]:
-    """Files of the study, by name."""
-    curves = {
-        name: 0.1 + 0.6 * np.exp(-(((WAVE - at) / 60) ** 2))
-        for name, at in zip("RGBY", (610, 540, 460, 580), strict=True)
-    }
-    lamps = {name: np.exp(-(((WAVE - at) / 12) ** 2)) for name, at in (("y", 590), ("r", 630))}
-
-    def table(columns: dict[str, np.ndarray]) -> str:
-        rows = [",".join(["wavelength_nm", *columns])]
-        return (
-            "\n".join(
-                [
-                    *rows,
-                    *(",".join(f"{value:.6g}" for value in row) for row in zip(WAVE, *columns.values(), strict=True)),
-                ]
-            )
-            + "\n"
-        )
-
-    return {
-        "qe.csv": table(curves),
-        "cut.csv": table({"ir_cut": np.where(WAVE < 680, 0.95, 0.1)}),
-        "leds.csv": table(lamps),
-        "lens.csv": "height_mm,cra_deg\n0,0\n1,5\n2,9\n3,12\n",
-        "dyes/blue.csv": table({"absorbance": np.exp(-(((WAVE - 620) / 30) ** 2))}),
-        "own.py": CODE,
-    }
+def write_files(folder: Path) -> None:
+    """Files of the study."""
+    curves = [0.1 + 0.6 * bell(at, 45) for at in (610, 540, 460, 580)]
+    csv(folder, "wavelength_nm,R,G,B,Y", WAVE, *curves, name="qe.csv")
+    csv(folder, "wavelength_nm,ir_cut", WAVE, np.where(WAVE < 680, 0.95, 0.1), name="cut.csv")
+    csv(folder, "wavelength_nm,y,r", WAVE, bell(590, 9), bell(630, 9), name="leds.csv")
+    (folder / "dyes").mkdir()
+    csv(folder, "wavelength_nm,absorbance", WAVE, bell(620, 20), name="dyes/blue.csv")
+    (folder / "lens.csv").write_text("height_mm,cra_deg\n0,0\n1,5\n2,9\n3,12\n")
+    (folder / "own.py").write_text(CODE)
 
 
-@pytest.mark.parametrize("name", list(file_texts()))
+@pytest.mark.parametrize("name", ["qe.csv", "cut.csv", "leds.csv", "lens.csv", "dyes/blue.csv", "own.py"])
 def test_every_file_that_a_study_reads_is_in_its_fingerprint(tmp_path: Path, name: str) -> None:
-    texts = file_texts()
-    for file, text in texts.items():
-        (tmp_path / file).parent.mkdir(exist_ok=True)
-        (tmp_path / file).write_text(text)
+    write_files(tmp_path)
     (tmp_path / "files.yaml").write_text(STUDY)
 
     def now() -> str:
@@ -140,13 +119,14 @@ def test_every_file_that_a_study_reads_is_in_its_fingerprint(tmp_path: Path, nam
 
     first = now()
     assert now() == first
+    text = (tmp_path / name).read_text()
     changed = {"lens.csv": ("2,9", "2,9.1"), "own.py": ("[:, :, 0]", "[:, :, 1]")}
     if name in changed:
         old, new = changed[name]
     else:
-        old = texts[name].splitlines()[30]
+        old = text.splitlines()[21]
         wave, value, *rest = old.split(",")
         new = ",".join([wave, f"{0.9 * float(value):.6g}", *rest])
-    assert texts[name].count(old) == 1
-    (tmp_path / name).write_text(texts[name].replace(old, new))
+    assert text.count(old) == 1
+    (tmp_path / name).write_text(text.replace(old, new))
     assert now() != first

@@ -9,7 +9,7 @@ import pytest
 
 from sweep.study.model import Study
 
-from ..build import issues, load, one_line
+from ..build import load, one_line
 from ..curve_texts import csv
 
 STUDY = """\
@@ -51,7 +51,6 @@ def test_a_user_curve_replaces_the_built_in_one_in_every_cfa(tmp_path: Path) -> 
     ("columns", "rest", "said"),
     [
         ("N: mine", ", relative_to: Yy", "relative_to: unknown curve (got 'Yy')"),
-        ("N: mine", ", relative_to: N", "relative_to: unknown curve (got 'N')"),
         ("N: mine", ", scale: 1", "QE above 1 (looks like percent: set `scale: 0.01`)"),
         ("N: other", "", "unknown column of own.csv"),
     ],
@@ -60,8 +59,3 @@ def test_faults_name_the_place(tmp_path: Path, columns: str, rest: str, said: st
     (tmp_path / "own.csv").write_text("wavelength_nm,mine\n390,40\n710,40\n")
     with one_line("tiny.yaml:2: sensor.files[0]", said):
         load(tmp_path, STUDY.replace("COLUMNS", columns).replace("REST", rest))
-
-
-def test_a_built_in_sensor_alone_has_its_own_name(tmp_path: Path) -> None:
-    text = STUDY.replace(", files: [{file: own.csv, columns: {COLUMNS}REST}]", ", name: mine")
-    assert "leave these out, or add `files`" in issues(tmp_path, text)[0]

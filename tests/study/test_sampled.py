@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.stats import qmc
 
@@ -14,7 +13,6 @@ from sweep.study import load_study
 from ..build import one_line, stopband_study
 
 BOX = "{left_nm: {min: 560, max: 620}, left_width_nm: 10, right_nm: {min: 630, max: 690}, right_width_nm: {min: 5, max: 25}}"
-FREE = ["left_nm", "right_nm", "right_width_nm"]
 LOW, HIGH = np.array([560.0, 630.0, 5.0]), np.array([620.0, 690.0, 25.0])
 
 
@@ -40,10 +38,8 @@ def test_a_design_depends_on_its_number_and_the_seed_alone(tmp_path: Path, metho
         np.testing.assert_array_equal(space.points(start, stop), every[start:stop])
     np.testing.assert_array_equal(points(tmp_path, keys), every)
     assert (points(tmp_path, keys, "seed: 2\n") != every).any()
-    drawn = pd.DataFrame(every, columns=space.parameters)
-    assert set(drawn["left_width_nm"]) == {10.0}
-    assert set(drawn["depth"]) == {1.0}
-    shares = (drawn[FREE].to_numpy() - LOW) / (HIGH - LOW)
+    assert (every[:, [1, 4]] == [10, 1]).all()
+    shares = (every[:, [0, 2, 3]] - LOW) / (HIGH - LOW)
     assert 0 <= shares.min() <= shares.max() <= 1
     random = np.random.default_rng(0).random(shares.shape)
     assert qmc.discrepancy(shares) < qmc.discrepancy(random)
@@ -72,12 +68,10 @@ def test_zip_and_list_take_values_together(tmp_path: Path) -> None:
     [
         ("sobol: 10", "yaml:7: sweeps.edges: `box` goes with"),
         (f"box: {BOX}", "one of `grid`, `sobol`, `lhs`, `zip`, `list`; there is none"),
-        (f"lhs: 3\n    sobol: 10\n    box: {BOX}", "there is sobol and lhs"),
         (f"sobol: 0\n    box: {BOX}", "yaml:12: sweeps.edges.sobol: not allowed (got 0)"),
-        ("zip: {left_nm: [1, 2], right_nm: [1, 2, 3]}", "there are: left_nm 2, right_nm 3"),
+        ("zip: {left_nm: [1, 2], right_nm: [1, 2, 3]}", "left_nm 2, right_nm 3"),
         ("list: []", "list: one design or more"),
         ("list: [{left_nm: 600}, {right_nm: 5}]", "design 2 names other parameters"),
-        ("list: [{left_um: 600}]", "did you mean 'left_nm'?"),
         ("sobol: 4\n    box: {left_nm: {min: 3, max: 4}}", "yaml:13: sweeps.edges.box.left_nm: out of range (got 3.0)"),
     ],
 )

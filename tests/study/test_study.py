@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sweep.study import folder_name, load_study
+from sweep.study import folder_name
 
 from ..build import BASE, issues, load, one_line
-from ..conftest import STUDIES
 from ..curve_texts import csv
 
 SENSOR_FILE = "sensor:\n  files:\n    - {file: qe.csv, columns: {R: R, C: C}}\n"
@@ -25,24 +24,10 @@ def test_a_study_is_resolved(tmp_path: Path) -> None:
         ("design", "mine", 1),
         ("sweep", "edges", 12),
     ]
-    assert study.n_designs == 14
     edges = study.spaces[2]
-    assert edges.points(0, 12)[[0, 1, 2, 11]].tolist() == [
-        [590, 5, 650, 5, 1],
-        [590, 5, 650, 25, 1],
-        [590, 10, 650, 5, 1],
-        [610, 10, 650, 25, 1],
-    ]
-    assert edges.points(5, 7).tolist() == edges.points(0, 12)[5:7].tolist()
-    assert study.objective.column == "csd_yellow_red"
-
-
-def test_the_measured_study_loads() -> None:
-    study = load_study(STUDIES / "measured.yaml")
-    assert not study.sensor.surrogate
-    assert study.lights.classes == ("green", "yellow", "red")
-    # one common scale: both files give the same clear pixel at 630 nm
-    assert study.sensor.qe["C"][230] == pytest.approx(study.sensor.qe["W"][230], rel=1e-3)
+    every = [[left, width, 650, right, 1] for left in (590, 600, 610) for width in (5, 10) for right in (5, 25)]
+    assert edges.points(0, 12).tolist() == every
+    assert edges.points(5, 7).tolist() == every[5:7]
 
 
 @pytest.mark.parametrize(
@@ -50,11 +35,7 @@ def test_the_measured_study_loads() -> None:
     [
         ("wavelength_nm,R,C\n400,2,5\n700,2,5\n", "qe.csv, column R: values up to 5 are no QE"),
         ("wavelength_nm,R,C\n450,0.1,0.5\n700,0.2,0.5\n", "qe.csv, column R: the curve is truncated"),
-        ("wavelength_km,R,C\n0.4,0.1,0.5\n0.7,0.2,0.5\n", "qe.csv:1: wavelength_km: no column wavelength"),
-        (
-            "wavelength_nm,r,C\n400,0.1,0.5\n700,0.2,0.5\n",
-            "unknown column of qe.csv (got 'R'); allowed: r, C; did you mean 'r'?",
-        ),
+        ("wavelength_nm,r,C\n400,0.1,0.5\n700,0.2,0.5\n", "unknown column of qe.csv (got 'R'); allowed: r, C"),
     ],
 )
 def test_a_wrong_curve_file_is_a_fault_of_the_study(tmp_path: Path, qe: str, expected: str) -> None:
@@ -76,58 +57,34 @@ def test_lights_from_files(tmp_path: Path) -> None:
     assert "no photons" in issues(tmp_path, text)[0]
 
 
-@pytest.mark.parametrize("quantity", ["energy", "photons"])
 @pytest.mark.parametrize(
     ("line_nm", "said"),
     [
-        (
-            602.4,
-            r"led.csv: r: sampled every 5 nm it has 0\.0% of its photons instead of 100\.0%, .*finer `wavelengths: ",
-        ),
+        (602.4, r"led.csv: r: sampled every 5 nm it has 0\.0% of its photons instead of 100\.0%"),
         (600.0, r"led.csv: r: sampled every 5 nm it has 4[67]\d\.\d% of its photons instead of 100\.0%"),
         (720.0, r"led.csv: r: 100\.0% of its photons lie outside the wavelength grid"),
-        (None, None),
+        (None, "^$"),
     ],
 )
-def test_a_line_between_nodes_is_not_outside_the_grid(
-    tmp_path: Path, line_nm: float | None, said: str | None, quantity: str
-) -> None:
+def test_a_line_between_nodes_is_not_outside_the_grid(tmp_path: Path, line_nm: float | None, said: str) -> None:
     """A line 1 nm wide, 5 nm / (1.064 * 1 nm) of its photons where it is on a node, or a smooth light."""
     nm = np.arange(380.0, 750.0, 0.1)
     smooth = np.exp(-4 * np.log(2) * ((nm - 550) / 30) ** 2)
     line = smooth if line_nm is None else 1e-6 * smooth + np.exp(-4 * np.log(2) * (nm - line_nm) ** 2)
     csv(tmp_path, "wavelength_nm,r,g", nm, line, smooth, name="led.csv")
 
-    def notes(step_nm: float, resampling: str = "linear") -> list[str]:
-        lights = LIGHT_FILE.replace("energy", f"{quantity}, resampling: {resampling}")
+    notes = []
+    for step_nm, resampling in ((5, "linear"), (0.5, "linear"), (5, "mean")):
+        lights = LIGHT_FILE.replace("energy", f"energy, resampling: {resampling}")
         grid = f"wavelengths: {{step_nm: {step_nm:g}}}\n"
         study = load(tmp_path, f"study: s\nsensor: ar0820\n{lights}{grid}cfas: [RGGB]\nobjective: csd_red_green\n")
-        return [warning for warning in study.warnings if "photons" in warning]
-
-    if said is None:
-        assert notes(5) == []
-        return
-    (note,) = notes(5)
-    assert re.search(said, note)
-    for others in (notes(0.5), notes(5, "mean")):
-        assert others == ([note] if line_nm == 720 else [])
-
-
-def test_a_light_between_nodes_is_refused_with_the_way_out(tmp_path: Path) -> None:
-    (tmp_path / "led.csv").write_text("wavelength_nm,r,g\n390,0,1\n602,0,1\n602.5,1,1\n603,0,1\n710,0,1\n")
-    text = (
-        f"study: s\nsensor: ar0820\n{LIGHT_FILE}wavelengths: {{step_nm: 5}}\ncfas: [RGGB]\nobjective: csd_red_green\n"
-    )
-    (said,) = issues(tmp_path, text)
-    assert "no photons on the wavelength grid, but between its nodes, 5 nm apart" in said
-    assert "allowed: a finer `wavelengths: {step_nm: ...}`, or `resampling: mean`" in said
+        notes.append("".join(warning for warning in study.warnings if "photons" in warning))
+    assert re.search(said, notes[0])
+    assert notes[1:] == [notes[0] if line_nm == 720 else ""] * 2
 
 
 def test_folder_names_stay_inside_the_output() -> None:
-    assert folder_name("stopband") == "stopband"
-    assert folder_name("../../etc") == ".._.._etc"
-    assert folder_name("..") == "_"
-    assert folder_name("<script>") == "_script_"
+    assert [folder_name(name) for name in ("a-b", "../../etc", "..")] == ["a-b", ".._.._etc", "_"]
 
 
 def test_columns_of_signal_types_must_differ(tmp_path: Path) -> None:
@@ -138,6 +95,14 @@ def test_columns_of_signal_types_must_differ(tmp_path: Path) -> None:
     )
     found = issues(tmp_path, text.replace("constraints:\n", "objective: csd_a_b\nconstraints:\n"))
     assert "the pairs a/b_b and a_b/b share the column csd_a_b_b" in found[0]
+
+
+def test_pairs_of_signal_types_have_no_order(tmp_path: Path) -> None:
+    goals = "objective: csd_yellow_red\nconstraints: {chromatic_csd_yellow_red: {min: 1}}\n"
+    text = BASE.split("constraints:")[0] + goals
+    plain, turned = load(tmp_path, text), load(tmp_path, text.replace("yellow_red", "red_yellow"))
+    assert turned.objective == plain.objective
+    assert turned.constraints == plain.constraints
 
 
 def test_a_study_needs_designs(tmp_path: Path) -> None:
