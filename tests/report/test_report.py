@@ -49,6 +49,15 @@ def test_every_column_of_the_rows_has_its_meaning(finished: FinishedFolder) -> N
     assert {*rows.columns} <= rows.attrs["meanings"].keys() | {"simulation_key"} | {*KEYS}
 
 
+def test_no_design_dominates_one_of_the_front(finished: FinishedFolder) -> None:
+    output = read_output(finished("stopband"))
+    first, second = (column.name for column in output.trade_off[:2])
+    made = output.table[output.table["feasible"]]
+    front = pd.read_parquet(finished("stopband") / "pareto.parquet")
+    for a, b in zip(front[first], front[second], strict=True):
+        assert not ((made[first] > a) & (made[second] > b)).any()
+
+
 def test_a_dollar_in_a_name_is_no_formula() -> None:
     from sweep.report.panels import Line, Lines, Picture
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from sweep.report.look import spread, styles_of
+from sweep.report.look import spread
 from sweep.report.words import digits, inward
 
 
@@ -32,10 +32,3 @@ def test_labels_are_apart_in_the_order_of_their_lines(heights: list[float], leas
     for (low, first), (high, second) in pairwise(pairs):
         assert abs(second - first) >= least * (1 - 1e-9)
         assert high == low or second > first
-
-
-def test_names_look_alike_on_every_page_and_no_two_on_one() -> None:
-    names = ["RGGB", "RYYCy", "best stopband", "mine", "yours"]
-    styles = styles_of(names)
-    assert styles["RGGB"] == styles_of(["RGGB"])["RGGB"]
-    assert len({style.color for style in styles.values()}) == len(names)
