@@ -136,7 +136,6 @@ def test_who_leads_has_the_most_at_each_number_of_its_range(lines: dict[str, lis
             {"A": [90, 81, 61], "B": [80, 77, 68]},
             "most up to 240 m (90.0 DN at 100 m; B 80.0 DN); **B** from 250 m on (68.0 DN at 300 m; A 61.0 DN).",
         ),
-        ({"A": [0.2, 9, 8], "B": [0.1, 2, 8]}, "most from 200 m on (9.00 DN at 200 m; B 2.00 DN)."),
     ],
 )
 def test_a_series_says_who_leads_from_where_to_where(lines: dict[str, list[float]], said: str) -> None:

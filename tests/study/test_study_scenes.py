@@ -42,7 +42,6 @@ from ..build import BASE, load, one_line
             "a: {intensity_cd: 200}",
             "tiny.yaml:5: scenarios.a: intensity_cd needs a fixed exposure: the white patch is given in photons",
         ),
-        ("a: {exposure: {exposure_s: 1}}", "tiny.yaml:5: scenarios.a.exposure.kind: missing"),
         (
             "far: {drive: {duty: 0.5, frequency_hz: 90}}",
             "search.scenario: a search under a pulsed light needs a fixed exposure (got 'far')",

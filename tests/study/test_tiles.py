@@ -74,11 +74,9 @@ def test_tiles_of_sixteen_pixels_have_names(name: str, counts: tuple[int, ...]) 
     ("text", "said"),
     [
         ("cfas: {tiles: 3x3, of: [R]}", "cfas.tiles: no such tiles (got '3x3')"),
-        ("cfas: {tiles: 2x2}", "cfas.of: no list of channels"),
         ("cfas: {tiles: 2x2, of: [R, N], modified: 1}", "cfas.of: the name of the modified channel"),
         ("cfas: {tiles: 2x2, of: [R, G], modified: 2}", "cfas.modified: pixels of each tile"),
         ("cfas: {tiles: 2x2, of: [R, G], modified: 1}", "cfas.modified: no box says which filter"),
-        ("cfas: {tiles: [RGB]}", "cfas.tiles: not the name of a 2x2 CFA"),
         (f"cfas: {{tiles: 2x2, of: [R, G]}}\n{BOX}", "boxes.stopband.cfa: of tiles with a modified pixel"),
         (f"cfas: {{tiles: 2x2, of: [R], modified: 1}}\n{BOX.replace('to: G', 'to: G, base: Y')}", "boxes.stopband.base: each pixel"),
         (f"cfas: {{tiles: 2x2, of: [R, G], modified: 1}}\n{BOX}search: {{algorithm: COBYLA}}", "search.algorithm: of a search over tiles"),
