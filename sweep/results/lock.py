@@ -47,11 +47,11 @@ def locked(output: Path) -> Iterator[None]:
     except OSError as error:
         raise OutputError(ValidationIssue(f"cannot be written: {error.strerror or error}", str(output))) from None
     try:
-        _clear(output)
+        clear(output)
         yield
     finally:
         with suppress(OSError):
-            _clear(output)
+            clear(output)
         lock.release()
 
 
@@ -106,7 +106,7 @@ def _is_held(path: Path) -> bool:
     return False
 
 
-def _clear(output: Path) -> None:
+def clear(output: Path) -> None:
     """Remove half-written files of killed commands and workers, but not through links."""
     inner = (output / RESULTS, output / ANSWERS, output / FIGURES)
     for folder in (output, *(inner_folder for inner_folder in inner if is_real_folder(inner_folder))):

@@ -23,7 +23,7 @@ from ..results.dictionary import described
 from ..results.facts import Provenance, missing_keys
 from ..results.folder import begin
 from ..results.identity import run_facts
-from ..results.lock import LOCK, locked
+from ..results.lock import LOCK, clear, locked
 from ..results.manifest import Manifest
 from ..results.shown import Gathered, Selection, best_rows, designs_of, front_rows, joined, shown_rows
 from ..results.tables import (
@@ -345,6 +345,7 @@ def discard(manifest: Manifest) -> None:
     """Remove everything of a run without a result; files of others stay."""
     Answers(manifest.folder).remove()
     manifest.discard()
+    clear(manifest.folder)
     with suppress(OSError):
         (manifest.folder / LOCK).unlink()
         manifest.folder.rmdir()

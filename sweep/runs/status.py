@@ -63,8 +63,8 @@ def status(folder: Path | str, *, verify: bool = False) -> Answer:
         if answers:
             lines.append(f"The search has {answers:,} answers.")
         values = {"designs": total, "finished_designs": done, "parts": parts, "search_answers": answers}
-    if parts and not finished:
-        lines.append(f"Finished parts: {folder / RESULTS}, which pandas.read_parquet reads.")
+        if parts:
+            lines.append(f"Finished parts: {folder / RESULTS}, which pandas.read_parquet reads.")
     lines += _lines_of_files(manifest, finished=finished, verified=verify and not running)
     return Answer(lines, {"folder": str(folder), "state": state, "verified": verify, **values})
 

@@ -34,6 +34,7 @@ _LEADING_ZEROS = re.compile(r"[+-]?0\d.*")
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _DOTTED = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+")
+_UNIT = re.compile(r"\s*(%|nm)$")
 _OVERFLOW = re.compile(r"[+-]?9\.9{2,}e\+?\d+|-9999(\.0*)?", re.IGNORECASE)
 """Marks of instruments for what they could not measure."""
 MISSING = ("", "nan", "n/a", "n.a.", "na", "#n/a", "#nv", "-", "--", "null", "none")
@@ -185,7 +186,7 @@ def _mark(lines: Sequence[str]) -> str:
         for line in sampled:
             cells = [c for c in (line.split() if mark == " " else line.replace('"', "").split(mark)) if c.strip()]
             if len(cells) > 1:
-                plain = [cell.replace(",", ".", 1).strip().rstrip("%").rstrip() for cell in cells]
+                plain = [_UNIT.sub("", cell.replace(",", ".", 1).strip()) for cell in cells]
                 total += sum(number_of(cell) is not None or cell.casefold() in MISSING for cell in plain) / len(cells)
         return total
 

@@ -51,7 +51,7 @@ def _boxes_of(boxes: Any, tiles: Sequence[tuple[str, Any, str]], modified: int) 
             continue
         if not modified:
             raise Fault(("boxes", name, "cfa"), "of tiles with a modified pixel", TILES, "`modified: 1` in `cfas`")
-        for key in ("channel", "base"):
+        for key in ("channel", "base", "below", "group"):
             if key in box:
                 raise Fault(("boxes", name, key), "each pixel of each tile in turn", box[key], f"no `{key}`")
         for cfa, _, base in tiles:

@@ -68,7 +68,7 @@ def posteriors(
 
 def _of_states(
     camera: HeadCamera, images: Numbers, heads: HeadElectrons, background: int, cases: _Cases
-) -> Float[Array, "cases 4"]:
+) -> Float[Array, "images states"]:
     """Return the probability of each state before a background."""
     n_cases, unlit = len(cases.table), heads.unlit[:, background]
     telling = np.argsort(-_telling(heads, unlit), kind="stable")

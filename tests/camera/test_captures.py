@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pydantic import ValidationError
 from scipy import special, stats
 
+from sweep.base.errors import SweepError
 from sweep.camera.camera import Camera
 from sweep.camera.captures import NAMED_CAPTURES, Capture
 from sweep.camera.model import scene_model
@@ -212,7 +212,7 @@ def test_pixels_of_one_electron() -> None:
     ],
 )
 def test_unsuitable_captures_are_refused(changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(ValidationError, match=said):
+    with pytest.raises(SweepError, match=said):
         Pixel(**changes)
 
 

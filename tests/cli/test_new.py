@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -46,7 +47,9 @@ def test_files_fill_in_sensor_and_lights(tmp_path: Path, rgbw: Path, leds: Path)
     study = load_study(path)
     (sensor,), (lights,) = study.section.sensor.files, study.section.lights.files
     assert sensor.columns == {"R": "red", "G": "QE green", "B": "B", "C": "Clear"}
-    assert (sensor.file, lights.file) == (rgbw.resolve().as_posix(), leds.resolve().as_posix())
+    assert (sensor.file, lights.file) == tuple(
+        Path(os.path.relpath(file, path.parent)).as_posix() for file in (rgbw, leds)
+    )
     assert sensor.scale == 0.01
     assert lights.signals == {"green": ["gn"], "yellow": ["yes"], "orange": ["or"], "red": ["rd: 1"]}
     assert study.objective.column == "csd_yellow_red"

@@ -207,7 +207,7 @@ Sample 3 %T | transmission | 0.01 |
 Transmission | transmission | |
 transmittance | transmission | |
 Transmittance (%) | transmission | 0.01 |
-internal transmittance | transmission | |
+internal transmittance | ? | |
 Transmissionsgrad [%] | transmission | 0.01 |
 Durchlässigkeit [%] | transmission | 0.01 |
 facteur de transmission | transmission | |
@@ -262,8 +262,8 @@ photon flux (µmol/m2/s/nm) | photons | 1 |
 PPFD | photons | |
 red [photons/s/nm] | photons | 1 |
 quanta | photons | |
-Counts | photons | |
-Intensity (counts) | photons | 1 |
+Counts | ? | |
+Intensity (counts) | ? | |
 Helligkeit | | |
 luminance | ? | |
 red (lm) | ? | |
@@ -507,6 +507,17 @@ PER_W = SHARE * NM31 * 1e-9 * E_C / (H * C)
 OD31 = -np.log10(SHARE)
 JASCO = "TITLE\tx\nXUNITS\tAXIS\nYUNITS\t%T\nMINY\t5\nXYDATA\n" + down("", 100 * SHARE, mark="\t").lstrip()
 STACKED = "x,y\n" + "".join(f"{w + shift},{v:.5f}\n" for shift in (0, 1.3) for w, v in zip(NM31, SHARE, strict=True))
+
+
+def in_rows(head: str, row: str) -> str:
+    """Rows of a format over the share above."""
+    values = enumerate(zip(NM31.tolist(), SHARE.tolist(), strict=True))
+    return head + "".join(
+        row.format(at=at, wave=wave, share=share, percent=100 * share, inverse=1e7 / wave)
+        for at, (wave, share) in values
+    )
+
+
 # Text, use, and which column has the share above, or the words of the refusal.
 TRAPS: dict[str, tuple[str, Use, int | str]] = {
     "units under blank": (down("Wavelength (nm),R,G\n,A/W,A/W", PER_W, PER_W), "sensor", 0),
@@ -525,7 +536,7 @@ TRAPS: dict[str, tuple[str, Use, int | str]] = {
     "per mille": (down("nm,T (‰)", 1e3 * SHARE), "filter", "has an unknown unit"),
     "relative response": (down("nm,R", SHARE, before="Relative Response of the sensor\n"), "sensor", "does not tell"),
     "loss": (down("nm,Loss (%)", 100 * SHARE), "filter", "does not tell its quantity"),
-    "A": (down("nm, A", OD31 / 2), "filter", "absorbance, or a name?"),
+    "A": (down("nm, A", OD31 / 2), "filter", "or a name?"),
     "dense": (down("nm,209 OD", 100 * SHARE), "filter", "are no optical density"),
     "wavenumbers": (down("Wavelength,T\ncm-1,%", 100 * SHARE), "filter", "wavelengths in an unknown unit"),
     "Raman": (down("Wavelength,T", SHARE, before="XAxis mode: Raman Shifts\n"), "filter", "something else"),
@@ -542,7 +553,38 @@ TRAPS: dict[str, tuple[str, Use, int | str]] = {
         0,
     ),
     "decimal comma among points": ("nm;R\n400;0,6\n500;0.5\n700;0.1\n", "sensor", "not a usable number (got '0,6')"),
-    "commas for thousands": ("nm;R\n400;1,234\n500;2,345\n700;3,456\n", "sensor", "a comma may be a decimal mark"),
+    "commas for thousands": ("nm;R\n400;1,234\n500;999\n700;3,456\n", "sensor", "a comma may be a decimal mark"),
+    "Fortran": (in_rows("nm,R\n", "{wave},{share:.6E}\n").replace("E-", "D-"), "sensor", 0),
+    "DN per energy": (down("nm,R DN/nJ/cm2", SHARE), "sensor", "the head has an unknown unit"),
+    "per hertz": (down("nm,red W/Hz", SHARE), "light", "the head has an unknown unit"),
+    "volts": (down("nm,R V/lx.s", SHARE), "sensor", "the head has an unknown unit"),
+    "electrons": (down("nm,R e-/lx/s", SHARE), "sensor", "the head has an unknown unit"),
+    "luminance": (down("nm,red cd/m2/nm", SHARE), "light", "the head has an unknown unit"),
+    "lumen": (down("nm,red lm/nm", SHARE), "light", "the head has an unknown unit"),
+    "dB per mm": (down("nm,T dB/mm", SHARE), "filter", "the head has an unknown unit"),
+    "per cm": (down("nm,T 1/cm", SHARE), "filter", "the head has an unknown unit"),
+    "inverse cm": (down("nm,T cm-1", SHARE), "filter", "the head has an unknown unit"),
+    "ten percent": (down("nm,R", 10 * SHARE / SHARE.max()), "sensor", "are no QE"),
+    "percent beside a unit": (
+        down("nm,R,G (QE)%", 60 * SHARE / SHARE.max(), 60 * SHARE / SHARE.max()),
+        "sensor",
+        "are no QE",
+    ),
+    "internal": (down("nm,N tau_i", SHARE), "filter", "does not tell its quantity"),
+    "angstrom": (in_rows("wavelength,R\n", "{wave}0,{share:.6f}\n"), "sensor", "angstrom"),
+    "falling wavenumbers": (in_rows("x,R\n", "{inverse},{share:.6f}\n"), "sensor", "wavenumbers"),
+    "commented head": (in_rows("#WL,R\n", "{at},{wave},{share:.6f}\n"), "sensor", 0),
+    "tabs and nm": (
+        "\t"
+        + "\t".join(f"{w} nm" for w in NM31)
+        + "\nR\t"
+        + "\t".join(map(str, 0.25 + SHARE / 9))
+        + "\nG\t"
+        + "\t".join(f"{s:.6f}" for s in SHARE)
+        + "\n",
+        "sensor",
+        1,
+    ),
     "two tables": ("nm,R\n400,1\n500,2\n\nsecond\n400,1\n500,2\n510,3\n", "sensor", "two tables in one file"),
     "some in percent": ("nm,R\n400,10 %\n500,20\n700,30\n", "sensor", "some values have percent signs"),
     "stacked": (STACKED, "sensor", "wavelengths begin again"),
@@ -583,3 +625,9 @@ def test_curves_of_two_lengths_end_where_they_end(tmp_path: Path) -> None:
     curves = read_curves(tmp_path / "a.csv")
     assert [list(wave) for wave, _ in map(curves.samples, ("a", "b"))] == [[400, 410, 420, 430], [420, 430, 440]]
     assert "a: there are no values beyond 400 to 430 nm" in curves.notes
+
+
+def test_a_comma_before_three_digits_of_every_number_is_a_decimal_mark(tmp_path: Path) -> None:
+    path = tmp_path / "german.csv"
+    path.write_text(in_rows("nm;R\n", "{wave};{percent:.3f}\n").replace(".", ","))
+    np.testing.assert_allclose(read_curves(path).values["R"], 100 * SHARE, rtol=0, atol=6e-4)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sweep.report.describe import describe
-from sweep.spectra.facts import NORMALIZED
+from sweep.spectra.facts import EACH_NORMALIZED, NORMALIZED
 from sweep.study import load_study
 
 from ..curve_texts import csv
@@ -44,4 +44,5 @@ def test_a_study_warns_of_normalized_curves_after_scaling(
         text.replace("{files", "{builtin: ar0820, files") if "relative" in keys else text
     )
     study = load_study(tmp_path / "tiny.yaml")
-    assert study.warnings == ((f"qe.csv: {NORMALIZED}",) if normalized else ())
+    notes = [NORMALIZED] * normalized + [EACH_NORMALIZED] * ("qe" in keys)
+    assert list(study.warnings) == [f"qe.csv: {note}" for note in notes]
