@@ -10,18 +10,19 @@ from pathlib import Path
 from ..base.errors import OutputError, ValidationIssue
 
 LEFT_OVER = r"\.tmp-\d+-.*"
-"""Names of files that are being written: hidden, and without the ending that readers of Parquet folders look for."""
+"""Names of files that are being written: hidden, outside of a dataset, and without its ending."""
 
 
 @contextmanager
 def atomic(path: Path) -> Iterator[Path]:
-    """Give a hidden name beside a path; on success it is synced and renamed to the path, else removed.
+    """Give a hidden name beside a path, or its dataset; on success it is synced and renamed to the path, else removed.
 
     A symbolic link at the path is replaced, not followed. A reader sees the old file or the new one, never a part.
 
     Raises OutputError if the disk refuses (full, read-only, no permission).
     """
-    hidden = path.with_name(f".tmp-{os.getpid()}-{path.name}~")
+    home = path.parent.parent if path.parent.suffix == ".parquet" else path.parent
+    hidden = home / f".tmp-{os.getpid()}-{path.name}~"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         hidden.unlink(missing_ok=True)

@@ -69,10 +69,11 @@ class Manifest:
     def _read_without(self) -> None:
         """Take the facts of a finished run from its provenance, and its files as they are."""
         known = read_facts(self.folder / PROVENANCE)
-        self.facts = {key: known[key] for key in ("fingerprint", "runs", "designs") if key in known}
+        self.facts = {key: known[key] for key in ("fingerprint", "runs", "designs") if key in known} | {_FILES: {}}
         if not self._is_whole():
             self.facts = {}
             return
+        self.facts.pop(_FILES)
         for name in self._names_of_run():
             with suppress(OSError):
                 self.files[name] = digest_of(self.path(name))

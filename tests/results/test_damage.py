@@ -22,7 +22,6 @@ from sweep.results.answers import ANSWERS
 from sweep.results.dataset import part_name, part_paths
 from sweep.results.identity import run_facts
 from sweep.results.manifest import Manifest
-from sweep.results.tables import MANIFEST
 from sweep.runs import output_folder, run_study
 from sweep.runs.status import status
 from sweep.study import Study, load_study
@@ -153,18 +152,6 @@ def test_a_damaged_file_is_never_served_and_the_same_command_makes_it_again(
     if file in (FIRST, PART) and damage is not removed:
         assert COMPUTED_AGAIN in (folder / "provenance.json").read_text()
     assert commanded("status", folder, "--verify")[0] == 0
-
-
-@pytest.mark.parametrize("damage", [cut, flipped, emptied])
-def test_a_run_of_which_nothing_is_known_is_not_touched(
-    folder: Path, tmp_path: Path, damage: Callable[[Path], None]
-) -> None:
-    damage(folder / MANIFEST)
-    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    for command in ("status", folder), ("report", folder), ("run", tmp_path / "small.yaml", "--output", folder.parent):
-        code, _, said = commanded(*command)
-        assert (code, said.count("\n"), f"{MANIFEST}: is damaged" in said) == (2, 1, True)
-    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
 
 
 def test_an_output_that_cannot_be_written_is_one_line(plain: Study, tmp_path: Path) -> None:
