@@ -81,7 +81,7 @@ def test_every_number_of_a_study_is_in_its_fingerprint(tmp_path: Path, group: in
         assert fingerprint(load_study(written(tmp_path, with_leaf(WHOLE, text, "else")))) == first
 
 
-CODE = "def apart(readings):\n    return readings.of('yellow')[:, :, 0] - readings.of('red')[:, :1, 0]\n\napart.unit, apart.label = 'DN', 'gap'\n"
+CODE = "FILES = ['shift.csv']\ntry:\n    from helpers import own\nexcept ImportError:\n    own = None\n\n\ndef apart(readings):\n    return readings.of('yellow')[:, :, 0] - readings.of('red')[:, :1, 0]\n\napart.unit, apart.label = 'DN', 'gap'\n"
 STUDY = """\
 study: files
 sensor:
@@ -107,9 +107,15 @@ def write_files(folder: Path) -> None:
     csv(folder, "wavelength_nm,absorbance", WAVE, bell(620, 20), name="dyes/blue.csv")
     (folder / "lens.csv").write_text("height_mm,cra_deg\n0,0\n1,5\n2,9\n3,12\n")
     (folder / "own.py").write_text(CODE)
+    (folder / "helpers").mkdir()
+    (folder / "helpers" / "__init__.py").write_text("import deeper\n")
+    (folder / "deeper.py").write_text("SHIFT = 1\n")
+    (folder / "shift.csv").write_text("shift\n1\n")
 
 
-@pytest.mark.parametrize("name", ["qe.csv", "cut.csv", "leds.csv", "lens.csv", "dyes/blue.csv", "own.py"])
+@pytest.mark.parametrize(
+    "name", ["qe.csv", "cut.csv", "leds.csv", "lens.csv", "dyes/blue.csv", "own.py", "deeper.py", "shift.csv"]
+)
 def test_every_file_that_a_study_reads_is_in_its_fingerprint(tmp_path: Path, name: str) -> None:
     write_files(tmp_path)
     (tmp_path / "files.yaml").write_text(STUDY)
@@ -120,7 +126,8 @@ def test_every_file_that_a_study_reads_is_in_its_fingerprint(tmp_path: Path, nam
     first = now()
     assert now() == first
     text = (tmp_path / name).read_text()
-    changed = {"lens.csv": ("2,9", "2,9.1"), "own.py": ("[:, :, 0]", "[:, :, 1]")}
+    changed = {"lens.csv": ("2,9", "2,9.1"), "own.py": ("[:, :, 0]", "[:, :, 1]"), "deeper.py": ("1", "2")}
+    changed |= {"shift.csv": ("1", "2")}
     if name in changed:
         old, new = changed[name]
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from PIL import Image
 from scipy.integrate import trapezoid
 
 from sweep import read_run
+from sweep.results.lock import locked
 from sweep.results.output import read_output
 from sweep.runs.vision import vision_designs
 from sweep.study import load_study
@@ -141,6 +143,16 @@ def test_an_interrupted_export_goes_on_and_another_is_refused(run: Path, tmp_pat
         path.unlink()
     pd.testing.assert_frame_equal(exported(run, torn), first)
     assert files_of(whole) == files_of(torn)
+    lost, cut, swapped = sorted((torn / "images").rglob("*.npz"))[:3]
+    lost.unlink()
+    os.truncate(cut, cut.stat().st_size // 2)
+    swapped.write_bytes((torn / "images" / "1" / "0-shuffled-train-0.npz").read_bytes())
+    one, other = sorted((torn / "parts").iterdir())[-2:]
+    one.write_bytes(other.read_bytes())
+    pd.testing.assert_frame_equal(exported(run, torn), first)
+    assert files_of(whole) == files_of(torn)
+    with locked(torn):
+        refused("in use by another command", "export", run, "--images", torn)
     refused("holds other images", "export", run, "--images", whole, "--form", "isp")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "notes.txt").write_text("x")
@@ -242,6 +254,10 @@ POINTS = "image_id,x_px,y_px,state,score\n"
         ("mine/0-0-street-test-0.txt", "9 0.5 0.5 0.1 0.1 0.9", ":1: no class"),
         ("mine/0-0-street-test-0.txt", "0 0.5 x 0.1 0.1 0.9", ":1: no number"),
         ("mine/0-0-street-test-0.txt", "0 50 50 10 10 0.9", ":1: no box"),
+        ("mine/0-0-street-test-0.txt", "1 0.5 nan 0.1 0.1 0.9", ":1: no number"),
+        ("mine/0-0-street-test-0.txt", "0_5 0.5 0.5 0.1 0.1 0.9", ":1: no number"),
+        ("mine/0-0-street-test-0.txt", "0 0.5 0.5 0.1 0.1 90", ":1: no box"),
+        ("mine.json", ROW.replace("1, 2, 3, 4", "100, 20, 900, 400"), "boxes reach beyond their images"),
         ("mine/classes.txt", "0 0.5 0.5 0.1 0.1 0.9", "not an image"),
         ("mine.csv", f"{POINTS}x,1,1,red,0.9\n", "not an image"),
         ("mine.csv", f"{POINTS}0-0-street-test-0,1,1,yelow,0.9\n", "no signal type"),
