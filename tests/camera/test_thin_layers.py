@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import tmm
 from scipy.optimize import minimize_scalar
 
 from sweep.camera.angular import cone_of, gauss_rays
@@ -17,6 +16,9 @@ from sweep.metrics.separation import separation
 
 from ..conftest import STUDIES
 from ..hard.scenes import GRID, scene
+from ..late import Late
+
+tmm = Late("tmm")
 
 _STACKS = 200
 

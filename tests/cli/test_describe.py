@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib.image
 import numpy as np
 import pytest
 
@@ -16,6 +15,7 @@ from sweep.study.editors import schema_text
 
 from ..commanded import commanded
 from ..curve_texts import WAVE, bell, csv
+from ..late import Late
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_a_picture_of_another_stays(tmp_path: Path) -> None:
     path = csv(tmp_path, "wavelength_nm,G", WAVE, 0.5 * bell(540, 50))
     describe(path, output=tmp_path)
     picture = tmp_path / "curves.png"
-    assert matplotlib.image.imread(picture).shape[2] == 4
+    assert Late("matplotlib.image").imread(picture).shape[2] == 4
     describe(path, output=tmp_path)
     picture.write_bytes(b"mine")
     with pytest.raises(OutputError, match="holds something else already"):

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import colour
 import numpy as np
 import pandas as pd
 import pytest
@@ -20,6 +19,9 @@ from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
 from sweep.spectra.spectrum import WavelengthGrid
 
 from ..commanded import commanded
+from ..late import Late
+
+colour = Late("colour")
 
 WINDSHIELD = '''\
 """A windshield of tinted glass."""

@@ -8,7 +8,6 @@ from functools import cache
 from itertools import combinations
 from pathlib import Path
 
-import colour
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
@@ -33,6 +32,10 @@ from sweep.metrics.tasks.colorimetry import delta_e_2000, lab
 from sweep.spectra.builtin.task_sets import separation_task, shipped, spectra_of_group
 from sweep.spectra.tasks import SHIPPED, Conditions, StudyTasks
 from sweep.study.load import study_of_keys
+
+from ..late import Late
+
+colour = Late("colour")
 
 KEYS = {
     "study": "tasks",

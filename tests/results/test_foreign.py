@@ -11,9 +11,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import duckdb
 import pandas as pd
-import polars
 import pyarrow.dataset as ds
 import pytest
 
@@ -29,6 +27,9 @@ from sweep.study import load_study
 from ..build import study_file
 from ..commanded import commanded
 from ..conftest import draw_nothing
+from ..late import Late
+
+duckdb, polars = Late("duckdb"), Late("polars")
 
 STRANGE = ("part-00000000 (1).parquet", "extra.parquet", "kind=x/a.parquet", ".hidden.parquet", "part-00000009.parquet")
 READERS: dict[str, Callable[[Path], int]] = {

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import openpyxl
 import pytest
 
 from sweep.base.errors import DataError
@@ -23,7 +22,10 @@ from sweep.study import load_study
 from ..build import load, one_line
 from ..cases import thinned
 from ..commanded import commanded
+from ..late import Late
 from ..watchdog import within
+
+openpyxl = Late("openpyxl")
 
 E_C, H, C = 1.602176634e-19, 6.62607015e-34, 299792458.0
 PEAKS = {"sensor": (610, 540, 460, 570), "filter": (560, 640, 500, 590), "light": (505, 592, 628, 636)}

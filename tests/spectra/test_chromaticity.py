@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import colour
 import numpy as np
 import pytest
-from colour.colorimetry import dominant_wavelength, excitation_purity
 
 from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
 from sweep.spectra.color import REGIONS, chromaticity, color_matching, display_colors, luminance_per_photon_radiance
 from sweep.spectra.signal_color import EQUAL_ENERGY, VISIBLE, light_color, spectral_locus
 from sweep.spectra.spectrum import WavelengthGrid
+
+from ..late import Late
+
+colour = Late("colour")
 
 GRID = WavelengthGrid()
 LIGHTS = BUILT_IN_LIGHTS["tl16"](GRID)
@@ -54,10 +56,10 @@ def test_hues_are_those_of_colour_science() -> None:
         power[rng.integers(0, 340, 2)] += rng.dirichlet([0.5, 0.5])
         color = light_color(power * VISIBLE.nodes_nm)
         assert color is not None
-        nm, leaves, _ = dominant_wavelength(color.xy, EQUAL_ENERGY)
+        nm, leaves, _ = colour.dominant_wavelength(color.xy, EQUAL_ENERGY)
         if np.hypot(*(leaves - locus[340])) < 1e-3 or np.hypot(*np.subtract(color.xy, EQUAL_ENERGY)) < 1e-2:
             continue
         hues += 1
         assert color.dominant_nm == (float(nm) if nm > 0 else None)
-        assert color.purity == pytest.approx(float(excitation_purity(color.xy, EQUAL_ENERGY)), abs=1e-6)
+        assert color.purity == pytest.approx(float(colour.excitation_purity(color.xy, EQUAL_ENERGY)), abs=1e-6)
     assert hues > 80

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from colour import MSDS_CMFS
 
 from sweep.spectra.color import SIGNAL_REGIONS
 from sweep.spectra.single_leds import Norm, RegionMap, all_leds
+
+from ..late import Late
+
+colour = Late("colour")
 
 SAE_J578 = {
     "red": ((0.665, 0.335), (0.645, 0.335), (0.721, 0.259), (0.735, 0.265)),
@@ -44,7 +47,7 @@ def test_norm_allows_colors_within_its_boundaries(norm: Norm, kind: str) -> None
     found = all_leds(requested).allowed(norm, kind)
     allowed = {*zip(found.peak_nm, found.fwhm_nm, strict=True)}
     assert 5 < len(allowed) < 100
-    functions = MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
+    functions = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
     wave = functions.wavelengths
     for peak in np.arange(578.0, 665.0, 2.0):
         for fwhm in (12.0, 24.0, 36.0):

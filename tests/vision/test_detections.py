@@ -8,11 +8,13 @@ from io import StringIO
 import numpy as np
 import pandas as pd
 import pytest
-from pycocotools.coco import COCO
-from pycocotools.cocoeval import COCOeval
 
 from sweep.vision.boxes import HEAD, POINT
 from sweep.vision.detections import Subset, draws_of, judge_of, scores_of_draws
+
+from ..late import Late
+
+coco, cocoeval = Late("pycocotools.coco"), Late("pycocotools.cocoeval")
 
 STATES = ("off", "red", "yellow", "green")
 BOX = ["left", "top", "width", "height"]
@@ -47,7 +49,7 @@ def by_pycocotools(targets: pd.DataFrame, found: pd.DataFrame, n_images: int) ->
         ]
 
     with redirect_stdout(StringIO()):
-        truth = COCO()
+        truth = coco.COCO()
         truth.dataset = {
             "images": [{"id": number + 1} for number in range(n_images)],
             "categories": [{"id": number + 1, "name": state} for number, state in enumerate(STATES)],
@@ -58,7 +60,7 @@ def by_pycocotools(targets: pd.DataFrame, found: pd.DataFrame, n_images: int) ->
         }
         truth.createIndex()
         said = [one | {"score": score} for one, score in zip(entries(found), found["score"], strict=True)]
-        done = COCOeval(truth, truth.loadRes(said), "bbox")
+        done = cocoeval.COCOeval(truth, truth.loadRes(said), "bbox")
         done.evaluate()
         done.accumulate()
         done.summarize()

@@ -13,7 +13,6 @@ from sweep.vision.crops import Crops, Heads
 from sweep.vision.image_kernels import draw_numbers, log_likelihoods
 from sweep.vision.images import HeadCamera
 from sweep.vision.lamps import CHECK, TEST, TRAIN, Lamps, split_lamps
-from sweep.vision.network_reader import NetworkReader
 from sweep.vision.observer import posteriors
 from sweep.vision.pixel_table import pixel_table
 from sweep.vision.prototypes import Prototypes
@@ -22,7 +21,10 @@ from sweep.vision.scores import confusion_matrix, costs, macro_f1, mean_of
 
 from ..build import BASE, issues, load
 from ..cases import thinned
+from ..late import Late
 from .heads import NO_FILTERS, head_setup, vision
+
+network_reader = Late("sweep.vision.network_reader")
 
 TWO = ["red", "orange"]
 
@@ -50,7 +52,7 @@ def test_the_likelihood_errs_as_two_gaussians_do() -> None:
 
 LEARNERS = {
     "prototypes": Prototypes,
-    "network": lambda crops, images: NetworkReader(crops, images, (1, 0)),
+    "network": lambda crops, images: network_reader.NetworkReader(crops, images, (1, 0)),
 }
 
 
