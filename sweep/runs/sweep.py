@@ -142,7 +142,7 @@ class Sweep:
         path, listed = self.folder / name, self.manifest.files.get(name)
         if listed is None and not path.is_file():
             return None
-        stored = read_part(path, part.key(planned.study, planned.fingerprint), planned.rules.schema, part.size)
+        stored = read_part(path, part.key(planned.fingerprint), planned.rules.schema, part.size)
         if stored is None or listed not in (None, stored[1]):
             self.warnings.append(f"part {part.number} was damaged on the disk and is computed again")
             return None
@@ -192,7 +192,7 @@ def _written(planned: Planned, part: Part, folder: Path | None, table: pa.Table)
     raise_if_stopped()
     schema = planned.rules.schema
     rows = table.select(schema.names).replace_schema_metadata(schema.metadata)
-    content = encoded_part(rows, part.key(planned.study, planned.fingerprint))
+    content = encoded_part(rows, part.key(planned.fingerprint))
     if folder is not None:
         write_bytes(content, folder / part_name(part.number))
     digest = hashlib.sha256(content).hexdigest()
