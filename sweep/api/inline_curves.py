@@ -29,7 +29,7 @@ def read_curves(file: Path | str) -> pd.DataFrame:
     ----------
     file : path-like
         A file with one or more curves (text of any table or instrument, spreadsheet, ISETCam ``.mat``, rawtoaces
-        ``.json``, IES ``.spdx``), or a folder of such files.
+        ``.json``), or a folder of such files.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Files of curves by the ending of their names, as rows of cells: text, ISETCam, rawtoaces, IES and spreadsheets."""
+"""Files of curves by the ending of their names, as rows of cells: text, ISETCam, rawtoaces and spreadsheets."""
 
 from __future__ import annotations
 
@@ -27,8 +27,6 @@ _MAT_VARIABLES = ("wavelength", "data", "filterNames")
 _MAT_NUMBERS = ("double", "single", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
 _MOST_UNPACKED = 200_000_000
 _MOST_FILES = 500
-_SPDX_UNITS = {"flux": "W", "transmittance": "transmission", "reflectance": "reflectance", "photonflux": "photons"}
-"""`SpectralQuantity` of IES TM-27 that is more than relative."""
 
 
 def is_curve_file(name: str) -> bool:
@@ -229,34 +227,6 @@ def _json_sheet(path: Path) -> Sheet:
     return sheet
 
 
-def _spdx_sheet(path: Path) -> Sheet:
-    """Read the XML of IES TM-27: one `SpectralData` for each wavelength."""
-    from xml.etree import ElementTree  # noqa: PLC0415  (seldom needed; no entities are let through)
-
-    file, content = str(path), read_input(path, MOST_BYTES, DataError)
-    if b"<!" in content.replace(b"<!--", b"") or b"<\0!\0D" in content:
-        raise DataError(ValidationIssue("XML with declarations of entities", file, allowed="XML without them"))
-    try:
-        root = ElementTree.fromstring(content)
-        items = {element.tag.rpartition("}")[2]: element for element in root.iter()}
-        data = [element for element in root.iter() if element.tag.rpartition("}")[2] == "SpectralData"]
-        pairs = [(float(element.attrib["wavelength"]), float(element.text or "")) for element in data]
-    except (ElementTree.ParseError, KeyError, ValueError):
-        raise DataError(
-            ValidationIssue(
-                "not a readable .spdx file", file, allowed="XML of IES TM-27 with `SpectralData wavelength=`"
-            )
-        ) from None
-    quantity = (items["SpectralQuantity"].text or "").strip() if "SpectralQuantity" in items else ""
-    name = " ".join((items["Description"].text or "").split()) if "Description" in items else ""
-    parts = sum(element.tag.rpartition("}")[2] == "SpectralDistribution" for element in root.iter())
-    if not pairs or parts > 1:
-        raise DataError(ValidationIssue(f"{parts} spectra with {len(pairs)} samples", file, allowed="one spectrum"))
-    sheet = _sheet_of(file, [wave for wave, _ in pairs], {name or path.stem: [value for _, value in pairs]})
-    sheet.unit = "" if quantity.casefold() in ("relative", "") else _SPDX_UNITS.get(quantity.casefold(), quantity)
-    return sheet
-
-
 def _excel_sheet(path: Path) -> Sheet:
     """Read the first sheet of a spreadsheet that has a table."""
     file, content = str(path), read_input(path, MOST_BYTES, DataError)
@@ -312,7 +282,6 @@ READERS: dict[str, Callable[[Path], Sheet]] = {
     **dict.fromkeys((".csv", ".tsv", ".txt", ".dat", ".asc", ".isd", ".prn"), text_sheet),
     ".mat": _mat_sheet,
     ".json": _json_sheet,
-    ".spdx": _spdx_sheet,
     ".xlsx": _excel_sheet,
 }
 """Readers by the ending of a file's name."""

@@ -345,12 +345,6 @@ GERMAN = "Sensor;Messung 3\nWellenlänge [nm];QE Rot [%];QE Grün [%];QE Blau [%
 SEKONIC = "Title,TL red\nMeasuring Mode,Ambient\nIlluminance [lx],12.3\nCIE1931 x,0.7012\n" + "".join(
     f"Spectral Data {nm:.0f}[nm],{value}\n" for nm, value in zip(NM, ppf(LED), strict=True)
 )
-SPDX = (
-    '<?xml version="1.0" encoding="utf-8"?>\n<IESTM2714 xmlns="iestm2714" version="1.0"><Header><Description>TL red</Description>'
-    "</Header><SpectralDistribution><SpectralQuantity>flux</SpectralQuantity>"
-    + "".join(f'<SpectralData wavelength="{nm}">{value}</SpectralData>' for nm, value in zip(NM, ppf(LED), strict=True))
-    + "</SpectralDistribution></IESTM2714>"
-)
 RAWTOACES = json.dumps(
     {
         "header": {"manufacturer": "A", "model": "B"},
@@ -373,7 +367,6 @@ INSTRUMENTS: dict[str, tuple[str, str, Use, dict[str, np.ndarray]]] = {
     "Specwin": ("a.isd", SPECWIN, "light", {"TL red": LED}),
     "CS-2000": ("a.csv", CS_2000, "light", {"TL red 2026/11/26": LED, "TL dim 2026/11/26": LED / 10}),
     "Sekonic": ("a.csv", SEKONIC, "light", {"TL red": LED}),
-    "IES": ("a.spdx", SPDX, "light", {"TL red": LED}),
     "rawtoaces": (
         "a.json",
         RAWTOACES,

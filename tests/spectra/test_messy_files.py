@@ -12,7 +12,7 @@ import pytest
 
 from sweep.base.errors import SweepError
 from sweep.spectra import read_text
-from sweep.spectra.formats import read_curves, scan_curves
+from sweep.spectra.formats import read_curves
 from sweep.spectra.lens_files import read_chief_rays
 from sweep.study import load_study
 
@@ -114,14 +114,6 @@ def test_binary_files_are_refused_before_parsing(tmp_path: Path, monkeypatch: py
     for read in (read_curves, read_chief_rays):
         with one_line("not a text table"):
             read(path)
-
-
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
-def test_xml_with_entities_is_refused_in_every_encoding(tmp_path: Path, encoding: str) -> None:
-    path = tmp_path / "a.spdx"
-    path.write_text(f"<?xml version='1.0' encoding='{encoding}'?><!DOCTYPE x [<!ENTITY a 'b'>]><x>&a;</x>", encoding)
-    with one_line("without"):
-        scan_curves(path)
 
 
 def mutated(rng: np.random.Generator) -> str:
