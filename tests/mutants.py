@@ -18,6 +18,7 @@ ROOT = Path(__file__).parent.parent
 GOLDEN, EFFECTS, PLAN = "contracts/test_golden.py", "camera/test_effects.py", "camera/test_plan.py"
 CAPTURES, LIMIT, SEARCH = "camera/test_captures.py", "search/test_limit.py", "search/test_search.py"
 SMOOTH, DAMAGE, RUNNER = "search/test_smooth.py", "results/test_damage.py", "run/test_runner.py"
+IDENTITY = "study/test_identity.py"
 
 
 class Mutant(NamedTuple):
@@ -55,47 +56,49 @@ MUTANTS = (
         "camera/pixel",
         "electrons * pixel.dn_per_e + pixel.offset_dn)",
         "electrons * pixel.dn_per_e - pixel.offset_dn)",
+    ),
+    Mutant(
+        "camera/pixel",
+        "(self.pitch_um * 1e-6) ** 2 * self.fill_factor",
+        "(self.pitch_um * 1e-6) ** 2",
         "camera/test_isetcam.py",
     ),
-    Mutant("camera/pixel", "(self.pitch_um * 1e-6) ** 2 * self.fill_factor", "(self.pitch_um * 1e-6) ** 2"),
     Mutant("camera/exposure", "full_e = exposure.level * setup", "full_e = setup"),
     Mutant("camera/exposure", "radiance / (ratio * grid.span_nm)", "radiance / (ratio * grid.size)"),
-    Mutant("camera/pwm", "on_time(drive, start)) / (length * drive.duty)", "on_time(drive, start)) / length", EFFECTS),
+    Mutant("camera/pwm", "on_time(drive, start)) / (length * drive.duty)", "on_time(drive, start)) / length", CAPTURES),
     Mutant("camera/pwm", "np.maximum(0, rest - (1 - drive.duty))", "np.maximum(0, rest - drive.duty)", EFFECTS),
     Mutant("camera/sampling", "(share / 4, down, right)", "(share / 8, down, right)", EFFECTS),
-    Mutant(
-        "camera/sampling", "radius = target.object_resolution_px / 2", "radius = target.object_resolution_px", EFFECTS
-    ),
+    Mutant("camera/sampling", "radius = target.object_resolution_px / 2", "radius = target.object_resolution_px"),
     Mutant("camera/sampling", "1 - np.abs(dx) / columns", "1 - np.abs(dx) / rows", EFFECTS),
     Mutant(
         "camera/sampling",
         "rows % tile.shape[0], columns % tile.shape[1]",
         "rows % tile.shape[1], columns % tile.shape[0]",
-        "hard/test_hard_cases.py",
+        EFFECTS,
     ),
     Mutant(
         "camera/psf",
         "/ (8 * scenario.optics.f_number**2)",
         "/ (4 * scenario.optics.f_number**2)",
-        "hard/test_hard_cases.py",
+        "camera/test_disc_image.py",
     ),
     Mutant(
         "camera/readout",
         "held = np.minimum(electrons, pixel.saturation_e) if clips else electrons",
         "held = electrons",
-        "hard/test_hard_cases.py",
+        PLAN,
     ),
     Mutant(
         "camera/electrons",
         "dark = self._fixed_uniform + self.position",
         "dark = self._fixed_uniform - self.position",
-        "camera/test_isetcam.py",
+        PLAN,
     ),
     Mutant(
         "camera/electrons",
         "rates += uniform[:, :, None, :]",
         "rates -= uniform[:, :, None, :]",
-        "camera/test_isetcam.py",
+        "camera/test_angle.py",
     ),
     Mutant(
         "camera/angular",
@@ -182,15 +185,20 @@ MUTANTS = (
         "search/test_as_read.py",
     ),
     Mutant("runs/rows", "[job.scenario, job.space, job.start, job.stop]", "[job.space, job.start, job.stop]", DAMAGE),
-    Mutant("runs/kept", "answer {self._round}, {at}", "answer {at}", "run"),
-    Mutant("runs/handovers", "capture.light * capture.qe_factor", "capture.qe_factor", CAPTURES),
-    Mutant("runs/uncertainty", "weights * curve + rest", "weights * curve - rest", "run"),
-    Mutant("runs/check", "stored == exact or (math", "True or (math", "run"),
-    Mutant("results/identity", '"files": dict(study.digests)', '"files": {}', "run"),
-    Mutant("results/identity", '"lights": lights.hexdigest()', '"lights": ""', "run"),
-    Mutant("results/identity", '"curves": curves.hexdigest()', '"curves": ""', "run"),
+    Mutant("runs/kept", "answer {self._round}, {at}", "answer {at}", "search/test_search.py run/test_runner.py"),
+    Mutant(
+        "runs/handovers",
+        "capture.light * capture.qe_factor",
+        "capture.qe_factor",
+        "run/test_scenes.py camera/test_captures.py",
+    ),
+    Mutant("runs/uncertainty", "weights * curve + rest", "weights * curve - rest", "run/test_sensors.py"),
+    Mutant("runs/check", "stored == exact or (math", "True or (math", "cli/test_audit.py run/test_runner.py"),
+    Mutant("results/identity", '"files": dict(study.digests)', '"files": {}', IDENTITY),
+    Mutant("results/identity", '"lights": lights.hexdigest()', '"lights": ""', IDENTITY),
+    Mutant("results/identity", '"curves": curves.hexdigest()', '"curves": ""', IDENTITY),
     Mutant("results/manifest", "digest_of(path) != self.files[name]", "False", DAMAGE),
-    Mutant("results/manifest", 'self.fingerprint == str(facts["fingerprint"])', "True", "run"),
+    Mutant("results/manifest", 'self.fingerprint == str(facts["fingerprint"])', "True", DAMAGE),
     Mutant("designs/bands", "edges[:, :, 0] - edges[:, :, 1]", "edges[:, :, 1] - edges[:, :, 0]"),
 )
 """Faults of sign, factor, axis, argument, clip, unit and key."""

@@ -122,7 +122,7 @@ def _text(error: Any) -> str | None:
     elif isinstance(error, OSError):
         names = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, (str, bytes))]
         if error.errno == errno.ENOSPC and not names:
-            names = [f"shared memory (/dev/shm) or the temporary folder ({tempfile.gettempdir()})"]
+            names = [f"the output, {tempfile.gettempdir()} or /dev/shm"]
         text = ": ".join([*names, error.strerror or str(error) or type(error).__name__])
     elif isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
         text = f"file name is not UTF-8 (got {error.object!r})"

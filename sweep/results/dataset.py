@@ -7,6 +7,7 @@ work is computed again.
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import re
 import stat
@@ -64,7 +65,7 @@ def refuse_others(folder: Path) -> None:
         raise OutputError(ValidationIssue("file not created by sweep; move it", str(folder / RESULTS)))
 
 
-def rows_in(folder: Path, designs: float) -> tuple[int, int]:
+def rows_in(folder: Path, designs: float = math.inf) -> tuple[int, int]:
     """Return the number of rows of a run's `designs`, and of parts, without those that cannot be read."""
     rows, parts = 0, 0
     for path in part_paths(folder):

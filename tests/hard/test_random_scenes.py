@@ -12,7 +12,7 @@ from sweep.camera.plan import plan_scene
 
 from .random_scenes import RandomScene, columns, random_scene
 
-N_SCENES, TOLERANCE_DN = 200, 0.1
+N_SCENES, TOLERANCE_DN = 80, 0.1
 _WITHIN_DN, _WITHIN_SHARE, _MEDIAN_DN = 0.5, 0.002, 0.02
 _ARITHMETIC_DN = 1e-9
 NOTHING: frozenset[str] = frozenset()

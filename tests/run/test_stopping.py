@@ -156,13 +156,13 @@ def tracks_resources(process: psutil.Process) -> bool:
 @pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize(
     ("text", "seed"),
-    [(NOISY, 0), (NOISY, 1), (SEVERAL, 0), (VISION, 0)],
-    ids=["plain", "plain again", "several", "vision"],
+    [(NOISY, 0), (SEVERAL, 0), (VISION, 0)],
+    ids=["plain", "several", "vision"],
 )
 def test_kills_at_random_moments_lose_nothing(tmp_path: Path, text: str, seed: int) -> None:
     """Processes, their groups and workers, by three signals; the rows are those of an undisturbed run each time.
 
-    Seven kills of each; a run that goes on may have another number of workers than the one that was killed.
+    Four kills of each; a run that goes on may have another number of workers than the one that was killed.
     """
     rng, kills = np.random.default_rng([17, seed]), 0
     (tmp_path / "tiny.yaml").write_text(text)
@@ -188,7 +188,7 @@ def test_kills_at_random_moments_lose_nothing(tmp_path: Path, text: str, seed: i
     started_s = time.monotonic()
     assert assert_ended(begun("undisturbed", 2)) == 0
     whole_s = time.monotonic() - started_s
-    while kills < 7:
+    while kills < 4:
         run = begun("out", 1 + int(rng.integers(2)))
         time.sleep(float(rng.uniform(0, whole_s)))
         number = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT][int(rng.integers(3))]

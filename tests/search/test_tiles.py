@@ -168,7 +168,7 @@ def test_tiles_are_searched_under_a_color_error(tmp_path: Path) -> None:
         ("slope_per_nm: {max: 0.06}", "slope_per_nm: {max: 0.06}, color_delta_e_mean_d65: {max: 3}"),
         ("objective:", "tasks: [color]\nobjective:"),
     )
-    study = tiles_study(tmp_path, "R, G, B, Y, Cy", *changes)
+    study = tiles_study(tmp_path, "R, G, B, Y", *changes)
     run_study(study, tmp_path / "out", 2, lambda *_: None)
     rows = pd.read_parquet(tmp_path / "out" / "results.parquet")
     answer = rows[rows["kind"] == "search"].iloc[0]

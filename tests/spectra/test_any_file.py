@@ -37,7 +37,7 @@ NAMES = {
 UNITS: dict[Use, tuple[str, ...]] = {
     "sensor": ("", "QE", "%", "A/W", "mA/W"),
     "filter": ("", "T", "%T", "OD", "Absorbance", "dB"),
-    "light": ("", "W/m2/nm", "µW/cm²/nm", "photons/s/nm", "counts"),
+    "light": ("", "W/m2/nm", "µW/cm²/nm", "photons/s/nm"),
 }
 """Words of the head, in brackets."""
 
@@ -53,8 +53,6 @@ def in_unit(unit: str, right: np.ndarray, nm: np.ndarray) -> np.ndarray:
             return -np.log10(right)
         case "dB":
             return 10 * np.log10(right)
-        case "counts":
-            return np.rint(60_000 * right)
     return right
 
 
@@ -79,8 +77,6 @@ def table(rng: np.random.Generator) -> Written:
     right = np.stack([0.004 + 0.6 * np.exp(-(((nm - peak) / width) ** 2)) for peak in PEAKS[use][:count]], axis=1)
     unit = str(rng.choice([*UNITS[use]]))
     numbers = in_unit(unit, right, nm[:, None])
-    if unit == "counts":
-        right = numbers
     mark = str(rng.choice([",", ";", "\t", "|"]))
     decimal = "," if rng.integers(2) and mark != "," else "."
     of_wave, scale = [("nm", 1.0), ("nm", 1.0), ("um", 1e-3)][rng.integers(3)]
@@ -138,7 +134,7 @@ def reads_back(path: Path, written: Written) -> bool:
     off = np.abs(found - written.values).max()
     assert off <= 1e-6 * np.abs(written.values).max(), (made.notes, written.unit, written.text[:600])
     if written.use == "light":
-        quantity = "photons" if written.unit.startswith(("photon", "count")) else "energy"
+        quantity = "photons" if written.unit.startswith("photon") else "energy"
         assert {made.units[name].quantity for name in made.values} == {quantity}
     return True
 
