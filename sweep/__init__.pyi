@@ -1,5 +1,7 @@
 from .api.check import check, plan
 from .api.evaluate import evaluate
+from .api.export import export
+from .api.export_images import export_images
 from .api.inline_curves import read_curves
 from .api.loading import lights, load_study, make_study, read_run, sensor, studies
 from .api.new import new_study
@@ -15,8 +17,6 @@ from .designs.families.stopband import MultiStopband, Stopband
 from .metrics.quantity import Quantity
 from .report.compare import compare
 from .report.describe import describe
-from .report.export import export
-from .report.export_images import export_images
 from .report.scores import score
 from .runs.audit import audit
 from .runs.listing import list_studies

@@ -10,7 +10,7 @@ import pytest
 
 from sweep.api.new import new_study
 from sweep.base.errors import StudyError, SweepError
-from sweep.report.page import answer_of, limits_of, plain, sections_of
+from sweep.report.page import plain, report_of
 from sweep.results.output import Output, read_output
 from sweep.runs import run_study
 from sweep.study import Study, load_study
@@ -168,11 +168,9 @@ def made(folder: Path, name: str = "mine", qe: Path | None = None, lights: Path 
     return folder / "studies" / f"{name}.yaml"
 
 
-def sentences_of(output: Output) -> list[str]:
-    """The answer of a run, and what else was found."""
-    lead, others = sections_of(output)
-    further = [line for section in others for line in (*section.answer, *section.limits)]
-    return [
-        plain(line)
-        for line in (*answer_of(output), *([] if lead is None else lead.limits), *limits_of(output), *further)
-    ]
+def text_of(output: Output) -> str:
+    """All that a page says, but for its pictures."""
+    report = report_of(output)
+    tables = [line for section in [report.lead, *report.sections] if section.table for line in section.table.lines]
+    pairs = [f"{name}: {words}" for name, words in (*report.conditions, *report.method)]
+    return plain("\n".join([report.sentence, *tables, *pairs]))

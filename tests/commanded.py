@@ -15,8 +15,9 @@ import signal
 signal.signal(signal.SIGINT, signal.SIG_DFL)  # while it is loaded, a stop ends it without a word, as `start` has it
 import sweep.report.panels
 from sweep.cli.app import main
-sweep.report.panels.Picture.svgs = lambda *_: ("", "")
-sweep.report.panels.Picture.files = lambda *_: {}
+import sweep.report.page
+sweep.report.page.svg = lambda *_: ""
+sweep.report.page.pictures_of = lambda *_: {}
 signal.signal(signal.SIGINT, signal.default_int_handler)
 try:
     main()

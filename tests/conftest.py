@@ -212,11 +212,12 @@ def whole(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFram
 def without_pictures(patch: pytest.MonkeyPatch) -> None:
     """Pages whose pictures are empty."""
 
-    def svgs(*_: object) -> tuple[str, str]:  # of its name, by which other processes know it
-        return "<svg></svg>", "<svg></svg>"
-
-    patch.setattr("sweep.report.panels.Picture.svgs", svgs)
-    patch.setattr("sweep.report.panels.Picture.files", lambda _, name: {f"{name}.svg": b"svg", f"{name}.png": b"png"})
+    patch.setattr("sweep.report.page.svg", lambda *_: "<svg></svg>")
+    for module in ("page", "sensors"):
+        patch.setattr(
+            f"sweep.report.{module}.pictures_of",
+            lambda panels, name="pareto": {f"{name}.svg": b"svg", f"{name}.png": b"png"} if panels else {},
+        )
 
 
 def draw_nothing(patch: pytest.MonkeyPatch) -> None:

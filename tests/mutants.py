@@ -141,7 +141,7 @@ MUTANTS = (
     Mutant("metrics/bound", "self.min - values", "values - self.min", SEARCH),
     Mutant("metrics/bound", "end = max(abs(self.min or 0.0)", "end = min(abs(self.min or 0.0)", RUNNER),
     Mutant("metrics/bound", "if quantity not in leave_out", "if quantity in leave_out", RUNNER),
-    Mutant("metrics/pareto", "maximise=True", "maximise=False", "report"),
+    Mutant("metrics/pareto", "maximise=True", "maximise=False", "report/test_report.py"),
     Mutant("metrics/smooth", "per = np.divide(0.5, values", "per = np.divide(1.0, values", SMOOTH),
     Mutant("metrics/smooth", "2 * self.values[:, None] * self.by_u", "self.values[:, None] * self.by_u", SMOOTH),
     Mutant(

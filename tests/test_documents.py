@@ -14,7 +14,7 @@ from sweep.study import load_study
 
 from .commanded import commanded
 from .conftest import FEWER, ROOT, STUDIES, FinishedFolder, draw_nothing
-from .gallery import ANSWERED, PICTURES, answer_of, with_answer, with_run
+from .gallery import ANSWERED, GALLERY, PICTURES, plain, report_in, with_answer, with_run, with_table
 from .printed import PRINTED, with_printed
 
 README = (ROOT / "README.md").read_text()
@@ -39,13 +39,17 @@ def test_an_answer_in_the_documents_is_that_of_its_run(
 ) -> None:
     if name in WHOLE:
         draw_nothing(monkeypatch)
-        code, output, _ = commanded("run", STUDIES / f"{name}.yaml", "--output", tmp_path, "--jobs", 1)
-        assert code == 0
+        assert commanded("run", STUDIES / f"{name}.yaml", "--output", tmp_path, "--jobs", 1)[0] == 0
+        folder = tmp_path / name
     else:
-        output = finished(name).with_name(f"{name}.said.txt").read_text()
+        folder = finished(name)
+    report = report_in(folder)
+    answer = plain(report.sentence)
+    shown = GALLERY.read_text()
+    assert _comparable(with_table(shown, name, report.markdown), name) == _comparable(shown, name)
     for document in ANSWERED:
         text = document.read_text()
-        assert _comparable(with_answer(text, name, answer_of(output)), name) == _comparable(text, name), document
+        assert _comparable(with_answer(text, name, answer), name) == _comparable(text, name), document
 
 
 def _comparable(text: str, study: str) -> str:
@@ -56,8 +60,8 @@ def _comparable(text: str, study: str) -> str:
 def test_the_readme_has_the_answer_of_its_run(finished: FinishedFolder) -> None:
     assert with_run(README, finished("stopband")) == README
     words = re.sub(r"<!--.*?-->|```.*?```|^\|[^\n]*\|$", "", README, flags=re.DOTALL | re.MULTILINE).split()
-    assert len(words) <= 960
-    assert README.count("](studies/figures/") == 3
+    assert len(words) <= 600
+    assert README.count("](studies/figures/") == 2
 
 
 def test_the_figure_of_measured_films_is_that_of_a_search(tmp_path: Path) -> None:

@@ -32,15 +32,11 @@ def _command(
     os.environ.update(environment)
     sys.argv = ["sweep", *arguments]
     from sweep.cli.start import start
-    from sweep.report.panels import Picture
+    from sweep.report import page
 
     if not drawn:
-
-        def svgs(*_: object) -> tuple[str, str]:  # of its name, by which other processes know it
-            return "", ""
-
-        Picture.svgs = svgs
-        Picture.files = lambda *_: {}
+        page.svg = lambda *_: ""
+        page.pictures_of = lambda *_: {}
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         start()

@@ -231,17 +231,18 @@ class LoadedStudy:
 
     def plot(self, **channels: CurveLike) -> Figure:
         """Draw the sensor's QE over the spectra of the lights, and further curves by name, as a Matplotlib figure."""
-        from ..report.look import CHANNELS, DIM, GAIN
-        from ..report.panels import Curves, Picture
+        from ..report.panels import Curves, figure_of
+        from ..report.tables import Axis
 
         study = self.study
         user = {f"{name} (own)": on_grid(name, curve, study.grid)[0] for name, curve in channels.items()}
         peak_one = study.lights.photons / study.lights.photons.max(axis=1, keepdims=True)
         lamps = {kind: peak_one[at].max(axis=0) for kind, at in study.lights.members.items()}
-        colors = {name: CHANNELS.get(name, DIM) for name in study.sensor.qe} | dict.fromkeys(user, GAIN)
-        title = f"Quantum efficiency, {study.sensor.name}"
-        panel = Curves(title, study.grid.nodes_nm, {**study.sensor.qe, **user}, lamps, colors, tuple(user))
-        return Picture((panel,), title).figure()
+        curves, nodes = {**study.sensor.qe, **user}, study.grid.nodes_nm
+        across = Axis("wavelength", "nm", float(nodes[0]), float(nodes[-1]))
+        top = Axis(high=1.1 * max(float(curve.max()) for curve in curves.values()))
+        title = f"Quantum efficiency of {study.sensor.name}"
+        return figure_of(Curves(title, across, top, next(iter(user), ""), nodes, curves, lamps))
 
     def plan(self, tolerance_dn: float | None = None) -> LoadedStudy:
         """Return the study with a plan of effects for each scenario.

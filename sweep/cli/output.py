@@ -19,8 +19,8 @@ Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", help="Print errors alone, a run's folder, and with --json the object.")
 ]
 _INTERVAL_S = 10.0
-_LEAST_SHARE, _LEAST_S = 0.01, 60.0
-"""The time left is printed from this share of a phase, or this time, on: the first jobs wait for the compiler."""
+_LEAST_SHARE, _LEAST_S, _KNOWN_S = 0.03, 5.0, 60.0
+"""The time left is said from a share of a phase and a time on, or from the last: first jobs wait for the compiler."""
 
 
 class Answered(Protocol):
@@ -94,7 +94,7 @@ class ProgressDisplay(ExitStack):
                 progress.TextColumn("{task.description}"),
                 progress.BarColumn(),
                 progress.MofNCompleteColumn(),
-                progress.TimeRemainingColumn(),
+                progress.TextColumn("{task.fields[pace]}"),
             )
             self._bars = self.enter_context(progress.Progress(*columns, console=Console(stderr=True)))
 
@@ -114,8 +114,8 @@ class ProgressDisplay(ExitStack):
             self._phase, self._started, self._first, self._last_line = phase, now, done, now
         if self._bars is not None:
             if new:
-                self._task = self._bars.add_task(phase, total=total)
-            self._bars.update(self._task, completed=done)
+                self._task = self._bars.add_task(phase, total=total, pace="")
+            self._bars.update(self._task, completed=done, pace=self._pace(now, done, total) if done < total else "")
         elif not self._quiet and now - self._last_line >= _INTERVAL_S:
             self._last_line = now
             print(f"{phase}: {done:,} of {total:,}, {self._pace(now, done, total)}", file=sys.stderr, flush=True)
@@ -123,7 +123,15 @@ class ProgressDisplay(ExitStack):
     def _pace(self, now: float, done: int, total: int) -> str:
         """Rate and time left, in words."""
         elapsed, new = now - self._started, done - self._first
-        if new <= 0 or (new < _LEAST_SHARE * total and elapsed < _LEAST_S):
+        if new <= 0 or (elapsed < _KNOWN_S and (new < _LEAST_SHARE * total or elapsed < _LEAST_S)):
             return "time left not known yet"
-        rate = new / max(elapsed, 1e-9)
-        return f"{rate:,.3g}/s, {(total - done) / rate:.0f} s left"
+        rate = new / elapsed
+        return f"{rate:,.3g}/s, {_duration((total - done) / rate)} left"
+
+
+def _duration(seconds: float) -> str:
+    """Return a time that passes, in words."""
+    minutes = round(seconds / 60)
+    if minutes < 2:
+        return f"{seconds:.0f} s"
+    return f"{minutes} min" if minutes < 120 else f"{minutes // 60:,} h {minutes % 60} min"

@@ -32,15 +32,16 @@ from ..results.tables import write_table
 from ..runs.dry_run import spread
 from ..spectra.lights import class_pairs
 from ..study import Study
-from .accuracy_figure import draw_accuracy
-from .look import png_of, svg_of
-from .pages import aligned
+from .panels import Lines, axis_over, png, svg
+from .tables import aligned
 
 _MOST_DESIGNS = 5
 _WHOLE_NM = 1e-6
 """A range that is so near to whole steps is of whole steps."""
 STEPS_NM = (10.0, 5.0, 2.0, 1.0, 0.5, 0.25)
 """Steps of the wavelengths that are measured, the finest last."""
+_LEAST_DN = 1e-6
+"""Errors below are drawn here."""
 _WARM = Accuracy(phases_per_px=1, finest_phase_px=0.25, field_positions=2, pwm_moments=2)
 
 
@@ -111,11 +112,23 @@ def measure_accuracy(
             rows.append(row | {"first_s": one.first_s, "following_s": one.following_s, "designs": numbers.size})
     table = pd.DataFrame(rows)
     write_table(pa.Table.from_pandas(table, preserve_index=False), output / "accuracy.parquet")
-    figure = draw_accuracy(table, own.name)
-    write_bytes(png_of(figure), output / "accuracy.png")
-    write_bytes(svg_of(figure, "accuracy", "Error over time of each setting.").encode(), output / "accuracy.svg")
+    panel = _panel(table)
+    write_bytes(png([panel]), output / "accuracy.png")
+    write_bytes(svg(panel, "accuracy").encode(), output / "accuracy.svg")
     lines = [*aligned(_in_words(table)), f"Files: {output}/: accuracy.parquet, accuracy.png, accuracy.svg."]
     return Answer(lines, {"folder": str(output), "measured": table.to_dict("records")})
+
+
+def _panel(table: pd.DataFrame) -> Lines:
+    """Return the largest error over the time of a further design, a line for each scene over its settings."""
+    lines = {}
+    for scenario, rows in table.groupby("scenario", sort=False):
+        known = rows.assign(s=rows["following_s"].fillna(rows["first_s"]), dn=rows["error_dn"].clip(lower=_LEAST_DN))
+        known = known[~known["setting"].str.startswith("reference")].sort_values("s")
+        lines[str(scenario)] = known["s"].to_numpy(dtype=float), known["dn"].to_numpy(dtype=float)
+    x, y = (np.concatenate([line[at] for line in lines.values()]) for at in (0, 1))
+    across, up = axis_over("time of a design", "s", x, log=True), axis_over("", "DN", y, log=True)
+    return Lines("Largest error of a CSD / DN, by wavelength step", across, up, lines=lines)
 
 
 def _in_words(table: pd.DataFrame) -> pd.DataFrame:

@@ -1,52 +1,42 @@
-"""Compare finished runs: page, picture and table."""
+"""Finished runs beside each other: best designs, designs that they share, fronts, and what differs in their studies."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import string
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
-import pandas as pd
+import numpy as np
 
 from ..base.answer import Answer
 from ..base.errors import OutputError, SweepError, ValidationIssue
 from ..results.atomic import write_bytes, write_text
 from ..results.folder import run_folder
-from ..results.output import Output, read_output
-from ..results.tables import write_csv
+from ..results.output import read_output
+from ..results.tables import csv_of
 from ..study import folder_name
-from .compare_fronts import Fronts, front_table, front_words, fronts_in, on_the_same_axes, scene_names
-from .compare_tables import (
-    best_of_runs,
-    curve_notes,
-    plain_differences,
-    ranking,
-    side_by_side,
-    with_units_in_cells,
-)
-from .page import page_of
-from .pages import aligned
-from .panels import Picture
-from .section import Told, table_of
-from .sections.trade_off import TradeOff
-from .terms import format_constraint
+from .numbers import SHARE, joined
+from .page import Report
+from .panels import Lines, Section, axis_over, png, svg
+from .run import LIGHT, Run, unit_of, words_of
+from .sections import conditions
+from .tables import Column, Table
 
 PAGE, PICTURE, TABLE = "compare.html", "fronts", "compare.csv"
-_KINDS = ("png", "svg")
-_MARK = b'<meta name="generator" content="sweep compare">'
-"""The line of the page's template by which a folder is known to hold a comparison."""
+_MARK = '<meta name="generator" content="sweep compare">'
+"""The line of the page by which a folder is known to hold a comparison."""
 _MARK_WITHIN = 1024
-_LETTERS = string.ascii_uppercase
-_MOST_LETTERS = 100
-OF_FRONTS = "whatever the constraints ask of the two axes"
-_MOST_SCENARIOS = 4
-"""Scenes whose fronts are printed; the page has all."""
+_MOST_LETTERS, _MOST_KEYS, _LETTERS_OF_VALUE = 100, 40, 60
+_LEFT_OUT = ("study", "title", "question")
+Columns = dict[str, tuple[Column, Mapping[str, Any]]]
 
 
 def compare(*folders: Path | str | Sequence[Path | str], output: Path | str | None = None) -> Answer:
-    """Compare finished runs: studies, best designs, fronts, versions; as a page, a picture and a table.
+    """Compare finished runs: studies, best designs, fronts; as a page, a picture and a table.
 
     Parameters
     ----------
@@ -58,171 +48,173 @@ def compare(*folders: Path | str | Sequence[Path | str], output: Path | str | No
     Returns
     -------
     Answer
-        What the runs say beside each other; ``facts`` has the tables as records.
+        What is the best of each run, and the files.
 
     Raises
     ------
     SweepError
-        If there are fewer or more runs, a folder holds no finished run, or a file of others would be replaced.
+        If a run is not finished, or the folder holds something else.
     """
     groups = [[group] if isinstance(group, str | os.PathLike) else group for group in folders]
-    places = [run_folder(place) for group in groups for place in group]
-    if not 2 <= len(places) <= len(_LETTERS):
-        allowed = f"2 to {len(_LETTERS)} folders"
-        raise SweepError(ValidationIssue("cannot be compared", None, None, "FOLDERS", len(places), allowed))
-    target = Path("outputs") / _folder_of(places) if output is None else Path(output)
-    _refuse_other(target)
-    outputs = [read_output(place) for place in places]
-    runs = {f"{letter} {' '.join(o.study.study.split())}": o for letter, o in zip(_LETTERS, outputs, strict=False)}
-    fronts, figure, notes = compare_fronts(runs)
-    answer = ranking(runs)
-    answer += [
-        f"{run}: {line}"
-        for run, output in runs.items()
-        for trade_off in TradeOff.of(output)
-        for line in trade_off.limits
-        if "separates more" in line
-    ]
-    notes = [*_same_folders(runs), *curve_notes(runs), *_constraint_note(runs), *notes]
-    best = best_of_runs(runs)
-    shown, left_out = side_by_side(best, runs)
-    plain, same = plain_differences(runs)
-    plain_words, words_of = with_units_in_cells(plain), {name: front_words(table) for name, table in fronts.items()}
-    sections = [
-        Told("Fronts", (f"In {name}, {OF_FRONTS}.",), None, table_of(table)) for name, table in words_of.items()
-    ]
-    if not words_of:
-        sections.append(Told("Fronts", ("There are no fronts to compare.",)))
-    sections.append(
-        Told(
-            "Plain CFAs and named designs",
-            () if len(plain) else (same or "The runs share none.",),
-            None,
-            table_of(plain_words),
-        )
-    )
-    note = f"{left_out} more parameters in {TABLE}." if left_out else ""
-    lead = Told("Best designs", (), figure, table_of(shown, note, len(shown)))
-    drawn = {} if figure is None else figure.files(PICTURE)
-    of_runs = "; ".join(f"{run}: {output.folder}" for run, output in runs.items())
-    html = page_of(
-        "compare", f"Comparison of {', '.join(runs)}", answer, of_runs, lead, sections, kind="comparison of runs",
-        limits=notes, files=[TABLE, *drawn], mark=_MARK.decode(),
-    )  # fmt: skip
-    write_text(html, target / PAGE)
-    write_csv(best, target / TABLE)
-    for kind in _KINDS:
-        _write_or_remove(drawn.get(f"{PICTURE}.{kind}"), target / f"{PICTURE}.{kind}")
-    lines = [f"{run}: {output.folder}" for run, output in runs.items()]
-    lines += _section("Best designs", shown, "none")
-    lines += [f"({left_out} more parameters in {TABLE}.)"] if left_out else []
-    lines += _section("Plain CFAs and named designs", plain_words, same or "none in common")
-    for name in list(fronts)[:_MOST_SCENARIOS]:
-        lines += _section(f"Fronts in {name}, {OF_FRONTS}", words_of[name], "none")
-    if len(fronts) > _MOST_SCENARIOS:
-        lines.append(f"({len(fronts) - _MOST_SCENARIOS} more scenes in {PAGE}.)")
-    lines += [
-        "",
-        *answer,
-        *(f"Note: {note}" for note in notes),
-    ]
-    lines.append(f"Files: {target}/: {', '.join([PAGE, TABLE, *drawn])}.")
-    of_all = [table.assign(scene=name) for name, table in fronts.items()]
-    tables = {"best": best, "plain": plain}
-    tables["fronts"] = pd.concat(of_all, ignore_index=True) if of_all else pd.DataFrame()
-    records = {name: table.to_dict("records") for name, table in tables.items()}
-    return Answer(lines, {"folder": str(target), **records, "notes": notes})
+    given = [run_folder(place) for group in groups for place in group]
+    if not 2 <= len(given) <= len(string.ascii_uppercase):
+        allowed = f"2 to {len(string.ascii_uppercase)}"
+        raise SweepError(ValidationIssue("a number of runs that cannot be compared", value=len(given), allowed=allowed))
+    read = [Run(read_output(folder)) for folder in given]
+    runs = {f"{letter} {run.study.study}": run for letter, run in zip(string.ascii_uppercase, read, strict=False)}
+    to = Path("outputs") / _folder_of(read) if output is None else Path(output)
+    _refuse_others(to)
+    report = report_of_runs(runs)
+    write_text(report.html(), to / PAGE)
+    assert report.lead.table is not None
+    write_text(csv_of(report.lead.table.frame.rename_axis("run").reset_index()), to / TABLE)
+    for kind in ("svg", "png"):
+        (to / f"{PICTURE}.{kind}").unlink(missing_ok=True)
+    for panel in report.lead.panels:
+        write_text(svg(panel, PICTURE), to / f"{PICTURE}.svg")
+        write_bytes(png([panel]), to / f"{PICTURE}.png")
+    files = [PAGE, TABLE, *(f"{PICTURE}.{kind}" for kind in ("svg", "png") if report.lead.panels)]
+    shared = next((s.table for s in report.sections if s.title == _SHARED), None)
+    lines = [*report.lines, *(["", f"{_SHARED}:", *shared.lines] if shared is not None and shared.rows else [])]
+    facts = {"folder": str(to), "best": _records(report.lead.table), "shared": _records(shared)}
+    return Answer([*lines, f"Files: {to}/: {', '.join(files)}."], facts)
 
 
-def compare_fronts(runs: Mapping[str, Output]) -> tuple[dict[str, pd.DataFrame], Picture | None, list[str]]:
-    """Compare the fronts of runs with the same axes, in equal scenes."""
-    group, notes = on_the_same_axes(runs)
-    places: dict[str, dict[str, tuple[Output, str]]] = {}
-    for run, scenarios in scene_names(group).items():
-        for scenario, scene in scenarios.items():
-            places.setdefault(scene, {})[run] = group[run], scenario
-    shared = [scene for scene, there in places.items() if len(there) > 1]
-    if not group:
-        return {}, None, notes
-    if not shared:
-        return {}, None, [*notes, "The runs have no equal scene, so no fronts are compared."]
-    if len(places) > len(shared) or any(len(places[scene]) < len(group) for scene in shared):
-        within = f"{', '.join(shared)}" if len(shared) <= _MOST_SCENARIOS else f"{len(shared)} of {len(places)}"
-        notes.append(f"Fronts are compared in the scenes that two runs or more have: {within}.")
-    fronts = {scene: those for scene in shared if (those := fronts_in(places[scene]))}
-    if not fronts:
-        return {}, None, notes
-    scene, shown = next(iter(fronts.items()))
-    separation, sensitivity = next(iter(group.values())).trade_off
-    marks = []
-    for run, (output, scenario) in places[scene].items():
-        for row in output.best[output.best["scenario"] == scenario].head(1).to_dict("records"):
-            marks.append((run, float(row[sensitivity.name]), float(row[separation.name])))
-    of = ", ".join(places[scene]) if len(places[scene]) <= 3 else f"{len(places[scene])} runs"
-    labels = sensitivity.words, separation.axis
-    tables = {scene: front_table(those) for scene, those in fronts.items()}
-    return (
-        tables,
-        Picture(
-            (Fronts(f"{labels[1]}: fronts in {scene}", labels, tuple(runs), tuple(shown), tuple(marks)),),
-            f"Fronts of {of}.",
-            "Stars: the best design of each run.",
-        ),
-        notes,
-    )
+def _records(table: Table | None) -> list[Any]:
+    return [] if table is None else table.frame.rename_axis("name").reset_index().to_dict("records")
 
 
-def _same_folders(runs: Mapping[str, Output]) -> list[str]:
-    runs_of_folder: dict[Path, list[str]] = {}
-    for run, output in runs.items():
-        runs_of_folder.setdefault(output.folder.resolve(), []).append(run)
-    return [f"{' and '.join(names)} are the same folder." for names in runs_of_folder.values() if len(names) > 1]
+_SHARED = "Designs that they share"
 
 
-def _constraint_note(runs: Mapping[str, Output]) -> list[str]:
-    requested = {
-        run: " and ".join(format_constraint(output, *bound) for bound in sorted(output.constraints.items())) or "none"
-        for run, output in runs.items()
+def report_of_runs(runs: Mapping[str, Run]) -> Report:
+    """Return the report over several runs; gains and losses are against the first one."""
+    first, best, apart = next(iter(runs)), _best(runs), _apart(runs)
+    found = [name for name, run in runs.items() if len(run.output.best)]
+    if apart or len(found) < 2:
+        text = f"Not ranked: {joined(apart)} differ." if apart else "Fewer than two runs have a design that was found."
+    else:
+        hero = max(found, key=lambda name: np.nan_to_num(_goal(runs[name])))
+        best = Table(best.columns, best.rows, first, hero, head="run")
+        text = f"**{hero}** has the most {words_of(runs[first].goal)}, each under its own constraints: {best.quoted('goal')}."
+    for name in (name for name in runs if name not in found):
+        text += f" {name} has no design that was swept or searched and meets its constraints."
+    sections = [Section(_SHARED, _shared(runs)), Section("What differs in the studies", _differences(runs))]
+    held = [(name, "; ".join(words for _, words in conditions(run)[:2])) for name, run in runs.items()]
+    files = [(name, str(run.output.folder)) for name, run in runs.items()]
+    lead = Section("Best designs", best, tuple(_fronts(runs)))
+    return Report("compare", f"Comparison of {', '.join(runs)}", text, lead, sections, held, files, [TABLE], mark=_MARK)
+
+
+def _apart(runs: Mapping[str, Run]) -> list[str]:
+    """Return what differs, so that figures of the runs are not of one thing: objective, scene, pixel, curves."""
+
+    def scene(run: Run) -> Any:
+        return run.study.scenarios[run.scene].model_dump(exclude={"at", "series"})
+
+    def curves(of: Mapping[str, Any]) -> Any:
+        return {name: of[name].tobytes() for name in of}
+
+    parts: dict[str, Callable[[Run], Any]] = {
+        "objectives": lambda run: run.goal.name,
+        "scenes": scene,
+        "pixels": lambda run: run.study.pixel,
+        "curves of the sensors": lambda run: curves(run.output.curves.sensor),
+        "curves of the lamps": lambda run: curves(run.output.curves.bundles),
     }
-    if len(set(requested.values())) < 2:
-        return []
-    return [f"The best designs meet different constraints ({'; '.join(f'{r}: {c}' for r, c in requested.items())})."]
+    first, *others = runs.values()
+    return [what for what, of in parts.items() if any(of(other) != of(first) for other in others)]
 
 
-def _folder_of(folders: Sequence[Path]) -> str:
-    """Return a folder name from those of the runs, short enough for every file system."""
-    name = "-".join(["compare", *(folder_name(folder.resolve().name) for folder in folders)])
-    if len(name) <= _MOST_LETTERS:
-        return name
-    digest = hashlib.sha256(name.encode("utf-8")).hexdigest()[:8]
-    return f"{name[: _MOST_LETTERS - len(digest) - 1]}-{digest}"
+def _goal(run: Run) -> float:
+    return float(run.here[run.hero][run.goal.name]) if run.hero in run.here else float("nan")
 
 
-def _refuse_other(target: Path) -> None:
-    """Raise OutputError if a file is there without the page of a comparison."""
-    try:
-        with (target / PAGE).open("rb") as handle:
-            if _MARK in handle.read(_MARK_WITHIN):
-                return
-    except OSError:
-        pass  # a message about the file follows below
-    for name in (PAGE, TABLE, *(f"{PICTURE}.{kind}" for kind in _KINDS)):
-        if os.path.lexists(target / name):
-            raise OutputError(
-                ValidationIssue("holds something else already", str(target / name), allowed="another --output")
-            )
+def _best(runs: Mapping[str, Run]) -> Table:
+    """Return a row for each run: its best design and its figures and parameters."""
+    columns: Columns = {"design": (Column("design"), {name: run.hero for name, run in runs.items()})}
+    first = next(iter(runs.values()))
+    columns["goal"] = first.column(first.goal.name), {name: _goal(run) for name, run in runs.items()}
+    keys = chain.from_iterable((*run.figures[1:], *run.output.parameters) for run in runs.values())
+    for key in dict.fromkeys(keys):
+        column = Column(key.removesuffix("_nm").replace("_", " "), "nm" if key.endswith("_nm") else "")
+        column = next((run.column(key) for run in runs.values() if key in run.output.columns), column)
+        columns[key] = column, {name: float(run.here.get(run.hero, {}).get(key, np.nan)) for name, run in runs.items()}
+    return Table.of(columns, reference=next(iter(runs)), head="run")
 
 
-def _write_or_remove(content: bytes | None, path: Path) -> None:
-    """Write a file of this comparison, or remove an older one."""
-    if content is not None:
-        write_bytes(content, path)
+def _fronts(runs: Mapping[str, Run]) -> Iterator[Lines]:
+    """Yield the fronts of the runs of which everything is alike."""
+    first, lines = next(iter(runs.values())), {}
+    for name, run in runs.items():
+        rows = run.output.table
+        rows = rows[rows["pareto"] & (rows["scenario"] == run.scene)].sort_values(LIGHT)
+        if len(rows) > 1 and not _apart({"first": first, name: run}):
+            lines[name] = rows[LIGHT].to_numpy(dtype=float), rows[run.goal.name].to_numpy(dtype=float)
+    if lines:
+        x, y = ([*chain.from_iterable(line[at] for line in lines.values())] for at in (0, 1))
+        up = axis_over(words_of(first.goal), unit_of(first.goal), y, log=False)
+        across = axis_over("light of the whole CFA", SHARE, x, zero=False, log=False)
+        yield Lines(f"Fronts: {up.label}", across, up, lines=lines)
+
+
+def _shared(runs: Mapping[str, Run]) -> Table:
+    """Return the goal of designs that several runs have."""
+    every = dict.fromkeys(chain.from_iterable(run.here for run in runs.values()))
+    names = [name for name in every if sum(name in run.here for run in runs.values()) > 1]
+    columns: Columns = {}
+    for key, run in runs.items():
+        values = {name: run.value(name, run.goal.name) for name in names if name in run.here}
+        columns[key] = Column(key, unit_of(run.goal), group=words_of(run.goal)), values
+    return Table.of(columns)
+
+
+def _differences(runs: Mapping[str, Run]) -> Table:
+    """Return the keys of the resolved studies that differ."""
+    flat = {name: dict(_flattened(run.output.resolved)) for name, run in runs.items()}
+    every = dict.fromkeys(chain.from_iterable(flat.values()))
+    keys = [
+        key for key in every if key.split(".")[0] not in _LEFT_OUT and len({of.get(key) for of in flat.values()}) > 1
+    ]
+    columns: Columns = {
+        name: (Column(name), {key: of.get(key, "") for key in keys[:_MOST_KEYS]}) for name, of in flat.items()
+    }
+    more = len(keys) - _MOST_KEYS
+    return Table.of(columns, head="key", note=f"{more} more keys differ." if more > 0 else "")
+
+
+def _flattened(value: Any, path: str = "") -> Iterator[tuple[str, str]]:
+    """Yield dotted keys and values as text."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _flattened(inner, f"{path}.{key}".lstrip("."))
+    else:
+        yield path, str(value)[:_LETTERS_OF_VALUE]
+
+
+def _folder_of(runs: Sequence[Run]) -> str:
+    """Return the name of the folder of a comparison."""
+    names = "-".join(folder_name(run.study.study) for run in runs)
+    if len(names) > _MOST_LETTERS:
+        names = f"{names[:_MOST_LETTERS]}-{hashlib.sha256(names.encode()).hexdigest()[:8]}"
+    return f"compare-{names}"
+
+
+def _refuse_others(folder: Path) -> None:
+    """Raise OutputError where a file that is no comparison's stands in the place of one."""
+    page = folder / PAGE
+    others = [
+        name
+        for name in (PAGE, TABLE, *(f"{PICTURE}.{kind}" for kind in ("svg", "png")))
+        if os.path.lexists(folder / name)
+    ]
+    if not others:
         return
     try:
-        path.unlink(missing_ok=True)
-    except OSError as error:
-        raise OutputError(ValidationIssue(f"cannot be removed: {error.strerror or error}", str(path))) from None
-
-
-def _section(title: str, table: pd.DataFrame, otherwise: str) -> list[str]:
-    return ["", f"{title}:", *aligned(table)] if len(table) else ["", f"{title}: {otherwise}"]
+        with page.open("rb") as file:
+            known = _MARK.encode() in file.read(_MARK_WITHIN)
+    except OSError:
+        known = False
+    if not known or page.is_symlink():
+        problem = "holds something else already"
+        raise OutputError(ValidationIssue(problem, str(folder / others[0]), allowed="another --output"))

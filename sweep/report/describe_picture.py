@@ -13,7 +13,7 @@ from ..spectra.color import REGIONS, display_colors
 from ..spectra.facts import Curve, Facts
 from ..spectra.signal_color import VISIBLE, LightColor, outline, spectral_locus
 from .figures import CURVE_CYCLE, TYPE_COLORS, panel_grid
-from .look import CHANNELS
+from .panels import CHANNELS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

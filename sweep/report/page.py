@@ -1,14 +1,17 @@
-"""Make the page of a finished run from its sections, and its answer for the terminal."""
+"""A page, an answer for the terminal, a block of a document: one object from the answer of a run and its sections."""
 
 from __future__ import annotations
 
 import re
-import textwrap
-from collections.abc import Iterable, Sequence
-from itertools import chain
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from itertools import chain, groupby
 from typing import Any
 
 import pyarrow as pa
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from ..base.types import Parallel, delayed, in_turn
@@ -16,152 +19,190 @@ from ..results.lock import locked
 from ..results.manifest import Manifest
 from ..results.output import Output
 from ..results.tables import MANIFEST, REPORT, RESULTS, SEARCHED, SWEPT, csv_of, encoded, is_drawn
+from .answers import answer_of, figures
 from .explorer import explorer_data
-from .hold import holds_for, saturation_limits
-from .leaders import label
-from .pages import page, script
-from .panels import Picture
+from .numbers import unit_shown
+from .panels import Answer, Panel, Section, png, styles_of, svg
 from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
-from .section import Section
-from .sections.clouds import Clouds
-from .sections.colors import Colors
-from .sections.curves import SensorCurves
-from .sections.deeper_reds import DeeperReds
-from .sections.edges import Edges
-from .sections.field import Field
-from .sections.flicker import Flicker
-from .sections.lamps import Lamps
-from .sections.left_out import LeftOut
-from .sections.method import Method
-from .sections.noise import Noise
-from .sections.other_cameras import OtherCameras
-from .sections.price import Price
-from .sections.published import Published
-from .sections.scenes import Scenes
-from .sections.series import Series
-from .sections.tasks import Tasks
-from .sections.tiles import AllTiles
-from .sections.trade_off import TradeOff
-from .sections.uncertain import Uncertain
-from .series import scene_in_words
-from .terms import edges_in_words, edges_of, format_constraints, unknown_lines
-from .words import joined, quantity, quoted, scaled
+from .run import Run, name_of, words_of
+from .sections import SECTIONS, Pairs, conditions, method
+from .tables import PROVEN, Column, Table
 
-ORDER: tuple[type[Section], ...] = (
-    *(
-        Flicker,
-        Noise,
-        Lamps,
-        Field,
-        Series,
-        TradeOff,
-        Scenes,
-        Edges,
-        Clouds,
-        DeeperReds,
-        Tasks,
-        Colors,
-        Uncertain,
-        AllTiles,
-        OtherCameras,
-        LeftOut,
-        Published,
-        SensorCurves,
-    ),
-)
-"""Sections of a page. The first that a study calls for and that `leads` answers it; a search answers before series."""
-_OF_SERIES = (Flicker, Noise, Series)
-MOST_PICTURES = 6
-_MOST_ANSWERS, _MOST_LIMITS, _MOST_FURTHER = 3, 5, 2
-_LINES, _LETTERS = 8, 120
-PARETO_PICTURE = "pareto"
-"""Name of the picture of the trade-off, as files for slides."""
+PICTURE = "pareto"
+"""Name of the picture of the first panels, as files for slides."""
+_TOLD = ("left out", "checked", "failed")
+"""Pairs of conditions and method that the terminal says."""
 
 
-def _kinds(output: Output) -> tuple[type[Section], ...]:
-    """Return the kinds of sections that a study may call for."""
-    if output.study.vision is None:
-        return ORDER
-    from .sections.vision import Vision  # noqa: PLC0415  (few studies have images)
-
-    return Vision, *ORDER
-
-
-def sections_of(output: Output) -> tuple[Section | None, list[Section]]:
-    """Return the section that answers the study's question, and the others in order."""
-    found = list(chain.from_iterable(kind.of(output) for kind in _kinds(output)))
-    candidates = [section for section in found if section.leads and section.answer]
-    search = output.provenance.search
-    if not output.best.empty and (search is None or search.scenarios < 2):
-        last = (*_OF_SERIES, Tasks, *(() if search is not None or len(output.scenarios) == 1 else (TradeOff,)))
-        candidates = sorted(candidates, key=lambda section: isinstance(section, last))
-    elif not output.best.empty:
-        candidates = sorted(candidates, key=lambda section: not (isinstance(section, Series) and section.searched))
-    elif output.study.tasks is not None and len(output.scenarios) == 1:
-        candidates = sorted(candidates, key=lambda section: not isinstance(section, Tasks))
-    lead = next(iter(candidates), None)
-    return lead, [section for section in found if section is not lead]
+@lru_cache(maxsize=1)
+def _templates() -> Environment:
+    loader = PackageLoader("sweep.report", "templates")
+    found = Environment(
+        loader=loader,
+        autoescape=lambda name: name is None or name.endswith(".html.j2"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    found.policies["json.dumps_kwargs"] = {"sort_keys": False, "allow_nan": False}
+    return found
 
 
-def answer_of(output: Output) -> list[str]:
-    """Return the answer to the study's question, a sentence each; `**` around the numbers that decide."""
-    if output.none_feasible:
-        searched = output.kind(SWEPT, SEARCHED)
-        if (searched["status"] != "ok").all():
-            return [f"Every design failed: {searched['status'].iloc[0]}."]
-        under = format_constraints(output)
-        none = f"No design meets every constraint{f': {under}' if under else ''}."
-        return [none, *_nearest_to_feasible(output), *unknown_lines(output)]
-    lead, _ = sections_of(output)
-    sentences = [] if lead is None else lead.answer
-    first, *rest = sentences[:_MOST_ANSWERS] or [_of_scenes(output)]
-    return (
-        [scaled(output, first), *rest]
-        if " DN" in first or "\u00a0DN" in first
-        else [first, *(scaled(output, line) if at == 0 else line for at, line in enumerate(rest))]
+def _file(name: str) -> Markup:
+    """Return a file beside the templates as it is."""
+    text = resources.files("sweep.report").joinpath("templates", name).read_text(encoding="utf-8")
+    return Markup(text.replace("</script", "<\\/script"))
+
+
+def filled(facts: Mapping[str, Any]) -> str:
+    """Return the sentence of a kind of answer; `**` around the numbers that decide."""
+    text = (
+        _templates()
+        .get_template("answers.j2")
+        .render({"hero": "", "recipe": "", "place": "", "light": "", **facts})
+        .strip()
+    )
+    return text if "_" in text.split(maxsplit=1)[0] else text[:1].upper() + text[1:]  # not a name like paper_N4
+
+
+def sentence(run: Run, answer: Answer) -> str:
+    """Return the answer in one sentence, which quotes the table of its section."""
+    if run.output.none_feasible:
+        return _none_feasible(run)
+    table = answer.section.table
+    if table is None or (
+        run.hero not in (*table.rows, *table.columns)
+        and answer.kind not in ("several", "errors_over", "score", "vision")
+    ):
+        return f"{run.hero or 'No design'}: see the tables."
+    proven = [
+        (name, key)
+        for name in table.rows
+        if name.startswith(PROVEN)
+        for key in ("goal", "worst")
+        if key in table.columns
+    ]
+    searched = run.hero in run.here and run.here[run.hero]["kind"] in (SEARCHED, SWEPT)
+    against = table.cell(run.hero, "goal") if answer.kind == "trade_off" else None
+    facts = {
+        "kind": answer.kind, "hero": run.hero, "recipe": run.recipe(run.hero) if searched else "", "reference": run.reference,
+        "quantity": words_of(run.goal), "scale": run.full_scale, "cell": table.quoted, "table": table,
+        "strict": _strict(run),
+        "bounds": [table.cell(name, key).text for name, key in proven], "place": run.place if searched else "", "light": _light(run),
+        "stricter": table.cell(run.hero, _strict(run)).against if _strict(run) in table.columns and against else "",
+        "better": against and against.against, "below": against and against.kind == "loss", **answer.facts,
+    }  # fmt: skip
+    return filled(facts)
+
+
+def _strict(run: Run) -> str:
+    return f"chromatic_pixel_csd_{'_'.join(run.goal.pair)}" if run.goal.pair else ""
+
+
+def _light(run: Run) -> str:
+    """Return the light of the design that answers, and of the reference."""
+    light = figures(run)
+    return light.quoted("light") if run.hero in light.rows else ""
+
+
+def _none_feasible(run: Run) -> str:
+    """Return that no design meets the constraints, and which comes nearest."""
+    rows = run.output.kind(SWEPT, SEARCHED)
+    if (rows["status"] != "ok").all():
+        return f"Every design failed: {rows['status'].iloc[0]}."
+    limits = dict(conditions(run)).get("constraints", "")
+    text = f"**No design** meets every constraint ({limits})."
+    near = rows.dropna(subset=["violation"]).sort_values("violation", kind="stable").head(1).to_dict("records")
+    if not near:
+        return text
+    near_by = [
+        f"{words_of(run.output.columns[n])} {run.output.columns[n].formatted(near[0][n])}"
+        for n in run.output.constraints
+    ]
+    where = f" in {near[0]['scenario']}" if len(run.output.scenarios) > 1 else ""
+    return f"{text} The nearest{where} is {name_of(near[0])}: {', '.join(near_by)}."
+
+
+@dataclass(frozen=True)
+class Report:
+    """An answer and its sections, in all forms."""
+
+    name: str
+    title: str
+    sentence: str
+    lead: Section
+    sections: Sequence[Section]
+    conditions: Pairs
+    method: Pairs
+    files: Sequence[str]
+    explorer: dict[str, Any] | None = None
+    mark: str = ""
+
+    @property
+    def lines(self) -> list[str]:
+        """The answer for a terminal: the sentence and its table."""
+        table = self.lead.table
+        return [plain(self.sentence), *(table.lines if table is not None and table.rows else [])]
+
+    @property
+    def markdown(self) -> str:
+        """The answer for a document."""
+        table = self.lead.table
+        return plain(self.sentence, keep=True) + (f"\n\n{table.markdown}" if table is not None else "")
+
+    def _repr_html_(self) -> str:
+        table = self.lead.table
+        return f"<p>{marked(self.sentence)}</p>{table_html(table) if table is not None else ''}"
+
+    def html(self, parallel: Parallel = in_turn) -> str:
+        """Return the page; `parallel` draws the panels."""
+        sections = [self.lead, *self.sections]
+        panels = [panel for section in sections for panel in section.panels]
+        drawn = iter([*parallel(delayed(svg, panel, f"p{at}") for at, panel in enumerate(panels))])
+        views = [_view(section, [Markup(next(drawn)) for _ in section.panels]) for section in sections]
+        return _templates().get_template("page.html.j2").render(
+            page={
+                "name": self.name, "title": self.title, "answer": marked(self.sentence), "lead": views[0], "sections": views[1:],
+                "conditions": self.conditions, "method": self.method, "files": self.files, "explorer": self.explorer,
+                "mark": Markup(self.mark), "style": _file("page.css"), "script": _file("page.js"),
+            }
+        )  # fmt: skip
+
+
+def report_of(output: Output) -> Report:
+    """Return the report of a run."""
+    run, study = Run(output), output.study
+    if study.vision is not None:
+        from .vision import vision_answer  # noqa: PLC0415  (few studies have images)
+
+        answer = vision_answer(run)
+    else:
+        answer = answer_of(run)
+    sections = {answer.section.title: answer.section}
+    for section in chain(answer.more, chain.from_iterable(of(run) for of in SECTIONS)):
+        sections.setdefault(section.title, section)
+    files = [
+        RESULTS,
+        *(name for name in sorted(Manifest(output.folder).files) if "/" not in name and not is_drawn(name)),
+        MANIFEST,
+    ]
+    title = study.title or study.question or study.study
+    rest = [section for section in sections.values() if section is not answer.section]
+    return Report(
+        study.study,
+        title,
+        sentence(run, answer),
+        answer.section,
+        rest,
+        conditions(run),
+        method(run),
+        files,
+        explorer_data(run),
     )
 
 
-def _nearest_to_feasible(output: Output) -> list[str]:
-    """Return the design that comes nearest to the constraints, in a sentence."""
-    rows = output.kind(SWEPT, SEARCHED).dropna(subset=["violation"])
-    if rows.empty:
-        return []
-    nearest = rows.sort_values("violation", kind="stable").iloc[0].to_dict()
-    figures = []
-    for name in output.constraints:
-        figures.append(f"{output.words(name)} {output.columns[name].formatted(nearest[name])}")
-    where = "" if len(output.scenarios) == 1 else f" in {scene_in_words(str(nearest['scenario']))}"
-    edges = edges_in_words(edges_of(nearest)).replace("**", "")
-    return [f"The nearest is {label(nearest)}{f' ({edges})' if edges else ''}{where}: {', '.join(figures)}."]
-
-
-def _of_scenes(output: Output) -> str:
-    """Return in how many scenes each CFA or design has the largest separation."""
-    column, rows = output.trade_off[0], output.named_rows
-    known = rows[(rows["status"] == "ok") & rows[column.name].notna()]
-    if known.empty:
-        return "No CFA or design of this study could be computed."
-    best = known.loc[known.groupby("scenario", observed=True, sort=False)[column.name].idxmax(), "name"].value_counts()
-    parts = [f"**{quoted(str(name))}** in {count}" for name, count in best.items() if count]
-    return f"Of {len(output.scenarios):,} scenes, the largest {quantity(column)} has {joined(parts)}."
-
-
-def limits_of(output: Output) -> list[str]:
-    """Return what limits the answer, a sentence each."""
-    lead, _ = sections_of(output)
-    return [*failed_lines(output), *([] if lead is None else lead.limits[:_MOST_LIMITS]), *saturation_limits(output)]
-
-
-def failed_lines(output: Output) -> list[str]:
-    """Return how many rows failed; nothing without any."""
-    failed = output.counts.failed
-    rows = "1 row, whose values are" if failed == 1 else f"{failed:,} rows, whose values are"
-    return [f"Failed: {rows} unknown here; status in {RESULTS} says why."] if failed else []
-
-
 def make_report(output: Output, *, repair: bool = False, parallel: Parallel = in_turn) -> None:
-    """Write the page, the picture of the trade-off, and published figures beside ours; with `repair` only damaged ones.
+    """Write the page, the picture of its first panels, and published figures beside ours; with `repair` only damaged ones.
 
     Raises OutputError if a file of others has its name, or the disk refuses.
     """
@@ -170,11 +211,19 @@ def make_report(output: Output, *, repair: bool = False, parallel: Parallel = in
         listed = [name for name in manifest.files if is_drawn(name)]
         if repair and not manifest.wrong({REPORT, *listed}):
             return
-        contents = {REPORT: report_page(output, sorted(manifest.files), parallel).encode("utf-8"), **_published(output)}
-        for trade_off in TradeOff.of(output):
-            contents |= {} if trade_off.picture is None else trade_off.picture.files(PARETO_PICTURE)
+        report = report_of(output)
+        contents = {
+            REPORT: report.html(parallel).encode("utf-8"),
+            **pictures_of(report.lead.panels),
+            **_published(output),
+        }
         manifest.write(contents)
         manifest.remove(name for name in listed if name not in contents)
+
+
+def pictures_of(panels: Sequence[Panel], name: str = PICTURE) -> dict[str, bytes]:
+    """Return the first panels as files for slides."""
+    return {} if not panels else {f"{name}.png": png(panels[:2]), f"{name}.svg": svg(panels[-1], name).encode("utf-8")}
 
 
 def _published(output: Output) -> dict[str, bytes]:
@@ -188,99 +237,68 @@ def _published(output: Output) -> dict[str, bytes]:
     }
 
 
-def report_page(output: Output, files: Iterable[str], parallel: Parallel = in_turn) -> str:
-    """Return the page of a run."""
-    lead, others = sections_of(output)
-    price = (
-        next(iter(Price.of(output)), None) if output.study.vision is None and not isinstance(lead, _OF_SERIES) else None
-    )
-    shown = [
-        section for section in others if section.answer or section.picture is not None or section.table is not None
+def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
+    """Return the answer with its table, what was left out, the check and the files; the last line is the folder."""
+    report = report_of(output)
+    told = [
+        f"{name[:1].upper()}{name[1:]}: {words}."
+        for name, words in [*report.conditions, *report.method]
+        if name in _TOLD
     ]
-    pictured = [section for section in shown if section.picture is not None][: MOST_PICTURES - 1]
-    study = output.study
-    return page_of(
-        study.study,
-        study.title or study.question or study.study,
-        answer_of(output),
-        holds_for(output),
-        lead,
-        [section for section in shown if section.picture is None or section in pictured],
-        price=price,
-        limits=limits_of(output),
-        method=next(iter(Method.of(output))).limits,
-        files=[
-            RESULTS,
-            *(name for name in files if not name.startswith((RESULTS, REPORT)) and not is_drawn(name)),
-            MANIFEST,
-        ],
-        explorer=explorer_data(output),
-        parallel=parallel,
-    )
+    took = f"Took {took_s:.1f} s; f" if took_s is not None else "F"
+    return [*report.lines, *told, f"{took}iles: {REPORT}, {RESULTS}, provenance.json in", str(output.folder)]
 
 
-def page_of(
-    name: str,
-    title: str,
-    answer: Sequence[str],
-    holds: str,
-    lead: Section | None,
-    sections: Sequence[Section],
-    *,
-    kind: str = "report of a sweep",
-    price: Section | None = None,
-    limits: Sequence[str] = (),
-    method: Sequence[str] = (),
-    files: Sequence[str] = (),
-    explorer: dict[str, Any] | None = None,
-    mark: str = "",
-    parallel: Parallel = in_turn,
-) -> str:
-    """Return a page: question, answer, what it holds for, the section that answers, price, limits, further ones."""
-    pictures = pictures_of([section.picture for section in [*([] if lead is None else [lead]), *sections]], parallel)
-    first = {} if lead is None else part(lead, pictures.pop(0)) | {"table": lead.table}
-    return page(
-        "page.html.j2",
-        mark=Markup(mark),
-        style=script("page.css"),
-        name=name,
-        kind=kind,
-        title=title,
-        answer=marked(" ".join(answer)),
-        holds=marked(holds),
-        lead={"title": "", "picture": None, "table": None, **first},
-        price=None if price is None else part(price, None),
-        limits=limits,
-        sections=[part(section, picture) for section, picture in zip(sections, pictures, strict=True)],
-        explorer=explorer,
-        script=script("explorer.js"),
-        method=method,
-        files=files,
-    )
-
-
-def pictures_of(pictures: Sequence[Picture | None], parallel: Parallel = in_turn) -> list[dict[str, Any] | None]:
-    """Draw pictures for a wide and for a narrow screen."""
-    svgs = iter(
-        [*parallel(delayed(picture.svgs, f"p{at}") for at, picture in enumerate(pictures) if picture is not None)]
-    )
-    return [
-        None
-        if picture is None
-        else dict(zip(("wide", "narrow"), map(Markup, next(svgs)), strict=True)) | {"caption": picture.caption}
-        for picture in pictures
-    ]
-
-
-def part(section: Section, picture: dict[str, Any] | None) -> dict[str, Any]:
-    """Return a section for a template."""
+def _table_view(table: Table) -> dict[str, Any]:
+    """Return a table for the template."""
+    columns = []
+    for column in table.columns.values():
+        axis = column.axis
+        ticks = [] if axis is None else [(axis.percent(at), words) for at, words in axis.ticks]
+        words = "" if axis is None else unit_shown(axis.unit)[1]
+        unit = f" / {words}" if words else ""
+        columns.append(
+            {"label": f"{column.label}{unit}", "meaning": column.meaning, "ticks": ticks, "group": column.group}
+        )
+    groups = [(name, len([*of])) for name, of in groupby(column["group"] for column in columns)]
+    styles, rows = styles_of(table.rows), []
+    for name in table.rows:
+        kind = (
+            "hero"
+            if name == table.hero
+            else "ref"
+            if name == table.reference
+            else "bound"
+            if name.startswith(PROVEN)
+            else ""
+        )
+        cells = [{"cell": table.cell(name, key), "level": _level(column)} for key, column in table.columns.items()]
+        color = "#9a9ea4" if table.head or kind == "bound" else styles[name].color
+        rows.append({"name": name, "cells": cells, "kind": kind, "color": color})
+    shown = groups if any(name for name, _ in groups) else []
     return {
-        "title": section.title,
-        "text": marked(section.short),
-        "picture": picture,
-        "table": section.table if picture is None else None,
-        "limits": section.limits[:_MOST_FURTHER] if section.picture is None else [],
+        "head": table.head,
+        "columns": columns,
+        "rows": rows,
+        "note": table.note,
+        "groups": shown,
+        "of": table.reference,
     }
+
+
+def _level(column: Column) -> float | None:
+    return None if column.axis is None or column.axis.level is None else column.axis.percent(column.axis.level)
+
+
+def table_html(table: Table) -> str:
+    """Return a table as HTML, for a notebook."""
+    module: Any = _templates().get_template("page.html.j2").module
+    return f"<style>{_file('page.css')}</style>{module.table(_table_view(table))}"
+
+
+def _view(section: Section, drawn: Sequence[Markup]) -> dict[str, Any]:
+    table = section.table if section.table is not None and section.table.rows else None
+    return {"title": section.title, "table": table and _table_view(table), "panels": drawn, "note": section.note}
 
 
 def marked(text: str) -> Markup:
@@ -288,26 +306,7 @@ def marked(text: str) -> Markup:
     return Markup(re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", str(escape(text))))
 
 
-def plain(text: str) -> str:
-    """Return a text for a terminal."""
-    return text.replace("**", "").replace("\u00a0", " ")
-
-
-def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
-    """Return answer, limits, what was left out, check and files in eight lines; the last one is the folder."""
-    method = next(iter(Method.of(output))).limits
-    tail = [*failed_lines(output), *(line for line in method if line.startswith(("Left out", "Checked")))]
-    took = f"Took {took_s:.1f} s; f" if took_s is not None else "F"
-    tail.append(f"{took}iles: {REPORT}, {RESULTS}, provenance.json in")
-    body = textwrap.wrap(plain(" ".join(answer_of(output))), _LETTERS)
-    room = _LINES - 1 - len(tail)
-    for line in [line for line in limits_of(output) if line not in tail]:
-        wrapped = textwrap.wrap(plain(line), _LETTERS)
-        if len(body) + len(wrapped) <= room:
-            body += wrapped
-    if len(body) > room:
-        body = [
-            *body[: room - 1],
-            textwrap.shorten(" ".join(body[room - 1 :]), _LETTERS, placeholder=" ... (more in the report)"),
-        ]
-    return [*body, *(textwrap.shorten(plain(line), _LETTERS, placeholder=" ...") for line in tail), str(output.folder)]
+def plain(text: str, *, keep: bool = False) -> str:
+    """Return a text for a terminal, or with its marks for a document."""
+    text = text.replace("\u00a0", " ")
+    return text if keep else text.replace("**", "")

@@ -1,389 +1,465 @@
-"""Panels of figures as plain values, and how each is drawn: lines, curves over lamps, maps."""
+"""Panels of a page: lines, points, curves over lamps, a map; each drawn once, in one size, as SVG or PNG; sections."""
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+import io
+import re
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..base.types import Array, Float
-from .look import (
-    FORBIDDEN,
-    GAIN,
-    INK,
-    LAMPS,
-    LOSS,
-    Style,
-    font,
-    label_ends,
-    log_axis,
-    offset,
-    place,
-    png_of,
-    sheet,
-    styles_of,
-    svg_of,
-    words_at,
-    wrapped,
-)
+from .numbers import NARROW, amount
+from .tables import Axis, Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Values = Float[Array, " numbers"]
-_ABOVE, _BELOW, LEFT = 34, 52, 62
-"""Room of a panel for its title, its axis and its numbers, px."""
-_MOST_MARGIN, _PX_PER_LETTER = 0.7, 8.5
-"""Share of a panel's width that names may take, and the width of a letter; longer names are cut."""
+WIDTH, HEIGHT, FONT = 520, 300, 15
+"""Of a figure, px, and the size of its letters."""
+_LETTER, _MOST_LETTERS, _TITLE = 8.0, 24, 58
+"""Width of a letter, px, the longest name that is written whole, and the longest title of letters of full size."""
+_APART = 17.0
+"""Height of a line of words, px."""
+INK, DIM, GRID, GAIN, LOSS = "#1d1d1f", "#5c6066", "#e7e8ea", "#065dcb", "#b3400e"
+LAMPS = {"green": "#7cc4a4", "yellow": "#f0cf5b", "orange": "#f0a860", "red": "#e58a84"}
+CHANNELS = {"R": "#c0392b", "Rx": "#8c2d04", "G": "#2e8b57", "B": "#2c6fbb", "Y": "#b07a00", "Cy": "#17a2a2"}
+_BLUES = ("#eef4fc", "#9dc0ee", "#4f8add", "#065dcb", "#04408c")
+_SWEPT = "#9dc0ee"
+_EDGES, _FAR = ("right", "left"), 88.0
+"""Sides of the words beside edges; from that percent of an axis on they stand left."""
+Values = Float[Array, " _numbers"]
+Pairs = tuple[Values, Values]
 
 
-class Panel(Protocol):
-    """One pair of axes of a figure."""
+@dataclass(frozen=True)
+class Style:
+    """How a CFA or design is drawn on every page."""
+
+    color: str
+    dash: Any = "-"
+    marker: str = "o"
 
     @property
-    def title(self) -> str:
-        """What it shows, with its unit."""
-
-    def room(self, *, wide: bool) -> tuple[float, float]:
-        """Return the width on the left for numbers and names, and on the right for words, px."""
-
-    def tall(self, *, wide: bool) -> float:
-        """Return the height of the axes, px."""
-
-    def draw(self, axes: Axes) -> None:
-        """Draw it."""
+    def ink(self) -> str:
+        """The color, dark enough for words."""
+        red, green, blue = (int(self.color[at : at + 2], 16) for at in (1, 3, 5))
+        share = min(1.0, 0.45 * 255 / max(0.299 * red + 0.587 * green + 0.114 * blue, 1.0))
+        return "#" + "".join(f"{int(share * part):02x}" for part in (red, green, blue))
 
 
-@dataclass(frozen=True)
-class Picture:
-    """Panels row by row, below each other on a narrow screen, with what cannot be seen in them.
-
-    `alone`: what the picture shows, for who does not see it; `columns`: panels side by side; all where it is 0.
-    """
-
-    panels: tuple[Panel, ...]
-    alone: str
-    caption: str = ""
-    columns: int = 0
-
-    def svgs(self, name: str) -> tuple[str, str]:
-        """Return the picture for a wide and for a narrow screen."""
-        return self._svg(name, wide=True), self._svg(name, wide=False)
-
-    def _svg(self, name: str, *, wide: bool) -> str:
-        return svg_of(self.figure(wide=wide), f"{name}-{'wide' if wide else 'narrow'}", self.alone)
-
-    def files(self, name: str) -> dict[str, bytes]:
-        """Return the picture as files, SVG and PNG."""
-        return {f"{name}.svg": self._svg(name, wide=True).encode(), f"{name}.png": png_of(self.figure())}
-
-    def figure(self, *, wide: bool = True) -> Figure:
-        """Draw it."""
-        columns = (self.columns or len(self.panels)) if wide else 1
-        lines = [self.panels[at : at + columns] for at in range(0, len(self.panels), columns)]
-        heights = [max(panel.tall(wide=wide) for panel in line) + _ABOVE + _BELOW for line in lines]
-        figure = sheet(wide, sum(heights))
-        top, width = 0.0, 72 * float(figure.get_size_inches()[0]) / columns
-        for line, height in zip(lines, heights, strict=True):
-            sides = [
-                max(panel.room(wide=wide)[side] for panel in self.panels) if wide and columns == 1 else None
-                for side in (0, 1)
-            ]
-            for at, panel in enumerate(line):
-                left, right = (
-                    own if side is None else side for own, side in zip(panel.room(wide=wide), sides, strict=True)
-                )
-                fits = min(1.0, _MOST_MARGIN * width / (left + right))
-                left, right = fits * left, fits * right
-                axes = place(figure, at * width + left, top + _ABOVE, width - left - right - 12, panel.tall(wide=wide))
-                title = panel.title if wide else "\n".join(textwrap.wrap(panel.title, 44))
-                axes.text(0, 1, title, transform=axes.transAxes + offset(axes, 0, 12), fontsize=font(figure),
-                          fontweight="bold", color=INK)  # fmt: skip
-                panel.draw(axes)
-                for text in axes.texts if fits < 1 else ():
-                    letters = int(max(left, right) / _PX_PER_LETTER)
-                    text.set_text("\n".join(_cut(line, letters) for line in text.get_text().split("\n")))
-            top += height
-        return figure
+_KNOWN = {
+    "RGGB": Style("#1d1d1f", "-", "s"),
+    "RCCB": Style("#767676", (0, (6, 3)), "^"),
+    "RCCC": Style("#a6a6a6", (0, (1, 2)), "v"),
+    "RYYCy": Style("#b07a00", (0, (6, 2, 1, 2)), "D"),
+    "paper_N4": Style("#39b1e2", (0, (4, 2)), "o"),
+    "best stopband": Style("#065dcb", "-", "*"),
+    "best at f/2": Style("#088a40", (0, (8, 3)), "P"),
+    "robust to lamps": Style("#540fcf", "-", "X"),
+    "robust to angles": Style("#fc4686", "-", "h"),
+}
+_OTHERS = (
+    *(_KNOWN[name] for name in ("best stopband", "best at f/2", "robust to lamps", "robust to angles", "paper_N4")),
+    Style("#00857c", (0, (7, 2, 2, 2)), "p"),
+    Style("#a0522d", (0, (3, 1)), "d"),
+    Style("#b07a00", (0, (2, 2)), "D"),
+    Style("#767676", (0, (6, 2, 1, 2)), "p"),
+)
 
 
-def _cut(line: str, letters: int) -> str:
-    return line if len(line) <= letters else f"{line[: letters - 1]}\u2026"
+def styles_of(names: Iterable[str]) -> dict[str, Style]:
+    """Return the style of each name: its own on every page, else one that no other has here."""
+    names = list(dict.fromkeys(names))
+    styles = {name: _KNOWN[name] for name in names if name in _KNOWN}
+    used = {style.color for style in styles.values()}
+    spare = [style for style in _OTHERS if style.color not in used] or list(_OTHERS)
+    for at, name in enumerate(sorted(name for name in names if name not in styles)):
+        styles[name] = spare[at % len(spare)]
+    return styles
 
 
-def right_of(names: Iterable[str], *, wide: bool) -> float:
-    """Return the width of names at the ends of lines, px; on a narrow screen they are wrapped."""
-    longest = max((len(part) for name in names for part in (name if wide else wrapped(name)).split("\n")), default=0)
-    return 20 + (7.4 if wide else 6.4) * longest
+def axis_over(
+    name: str,
+    unit: str,
+    values: Iterable[float],
+    *,
+    log: bool | None = None,
+    zero: bool = True,
+    level: float | None = None,
+) -> Axis:
+    """Return an axis that holds values and a level: logarithmic over more than a decade, unless `log` says otherwise."""
+    known = np.array([*values, *([] if level is None else [level])], dtype=float)
+    known = known[np.isfinite(known)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    log = low > 0 and high / low > 15 if log is None else log
+    if log:
+        least = float(known[known > 0].min(initial=high or 1.0))
+        return Axis(name, unit, min(least, high), high if high > least else 10 * least, True, level)
+    room = 0.1 * (high - low)
+    low = min(0.0, low) if zero else low - room
+    return Axis(name, unit, low, high + room if high > low else low + 1.0, False, level)
 
 
 @dataclass(frozen=True)
-class Line:
-    """Values over numbers; `upper`: the other end of a band."""
-
-    x: Values
-    y: Values
-    upper: Values | None = None
-
-
-@dataclass(frozen=True)
-class Ring:
-    """A place where the answer loses, or a crossing, with its number."""
-
-    x: float
-    y: float
-    text: str = ""
-    below: bool = False
-
-
-@dataclass(frozen=True)
-class Lines:
-    """A line for each name over a number, with names at their ends.
-
-    `bold`: the name that answers; `level`: a height and its words; `zone`: a range of heights that is not allowed, and
-    its words; `band`: a range of numbers, and its words; `ticks`: heights and their words; `most`: the least upper end.
-    """
+class Panel:
+    """Title and axes; `bold`: the name that answers."""
 
     title: str
-    x_label: str
-    lines: Mapping[str, Line]
+    x: Axis
+    y: Axis
     bold: str = ""
-    log_x: bool = False
-    log_y: bool = False
-    level: tuple[float, str] | None = None
+
+    @property
+    def room(self) -> float:
+        """Width on the right for words, px."""
+        return 14.0
+
+    @property
+    def y_ticks(self) -> Sequence[tuple[float, str]]:
+        """Numbers on the left."""
+        return self.y.ticks
+
+    def draw(self, axes: Axes) -> None:
+        """Draw it."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Lines(Panel):
+    """A line for each name, or a band down to a `floor`; `zone`: a forbidden range of heights, in words."""
+
+    lines: Mapping[str, Pairs] = field(default_factory=dict)
+    floors: Mapping[str, Values] = field(default_factory=dict)
     zone: tuple[float, float, str] | None = None
-    band: tuple[float, float, str] | None = None
-    rings: tuple[Ring, ...] = ()
-    ticks: tuple[tuple[float, str], ...] = ()
-    marked: bool = True
-    height: float = 320
-    left: float = LEFT
-    most: float = 0.0
+    ticks: Sequence[tuple[float, str]] = ()
 
-    def room(self, *, wide: bool) -> tuple[float, float]:
-        """Numbers on the left, names on the right."""
-        return self.left, right_of(self.lines, wide=wide)
+    @property
+    def room(self) -> float:
+        """Width of the names at the ends."""
+        return 12 + _LETTER * max((min(len(name), _MOST_LETTERS) for name in self.lines), default=0)
 
-    def tall(self, *, wide: bool) -> float:
-        """As stated, or lower."""
-        return self.height if wide else 230
+    @property
+    def y_ticks(self) -> Sequence[tuple[float, str]]:
+        """Numbers on the left."""
+        return self.ticks or self.y.ticks
 
     def draw(self, axes: Axes) -> None:
-        """Draw lines, marks and names."""
-        styles = styles_of(self.lines)
-        x = np.concatenate([line.x for line in self.lines.values()])
-        y = np.concatenate([line.y for line in self.lines.values()])
-        known = y[np.isfinite(y) & (y > 0)] if self.log_y else y[np.isfinite(y)]
-        low, high = (float(known.min()), float(known.max())) if known.size else (0.1 * self.log_y, 1.0)
-        if self.level is not None:
-            low, high = min(low, self.level[0]), max(high, self.level[0])
-        if self.log_x:
-            log_axis(axes, "x", float(x.min()), float(x.max()))
-        axes.set_xlim(float(x.min()), float(x.max()))
-        if self.log_y:
-            low, high = low / 1.5, high * 1.7
-            log_axis(axes, "y", low, high)
-        else:
-            low, high = min(0.0, low), max(high, self.most)
-            low, high = low - 0.02 * (high - low), high + 0.08 * (high - low or 1.0)
-        if self.ticks:
-            axes.set_yticks([height for height, _ in self.ticks], [text for _, text in self.ticks])
+        """Draw lines with names at their ends."""
+        styles, ends = styles_of(self.lines), {}
+        for name, (x, y) in self.lines.items():
+            style, bold, known = styles[name], name == self.bold, np.isfinite(y)
+            if not known.any():
+                continue
+            width, order = 3.2 if bold else 1.7, 4 if bold else 3
+            marker = style.marker if len(x) < 40 else ""
+            axes.plot(
+                x[known], y[known], color=style.color, linewidth=width, linestyle=style.dash, marker=marker, markersize=4.5,
+                zorder=order, gid=_gid(name),
+            )  # fmt: skip
+            if name in self.floors:
+                axes.fill_between(
+                    x[known], self.floors[name][known], y[known], color=style.color, alpha=0.13, linewidth=0
+                )
+            ends[name] = float(y[known][-1]), style, bold
         if self.zone is not None:
-            axes.axhspan(self.zone[0], self.zone[1], color=FORBIDDEN, linewidth=0, zorder=0)
-            words_at(
-                axes,
-                self.zone[2],
-                *_inside(axes, 0.98, 0.0)[:1],
-                np.sqrt(self.zone[0] * self.zone[1]),
-                ha="right",
-                color=LOSS,
-            )
-        if self.band is not None:
-            axes.axvspan(self.band[0], self.band[1], color=FORBIDDEN, linewidth=0, zorder=0)
-            middle = np.sqrt(self.band[0] * self.band[1]) if self.log_x else (self.band[0] + self.band[1]) / 2
-            axes.text(middle, 0.5, self.band[2], transform=axes.get_xaxis_transform(), ha="center", va="center",
-                      color=LOSS, fontsize=font(axes.figure))  # type: ignore[arg-type]  # fmt: skip
-        for name, line in self.lines.items():
-            style, bold = styles[name], name == self.bold
-            if line.upper is not None:
-                axes.fill_between(line.x, line.y, line.upper, color=style.color, alpha=0.14, linewidth=0)
-            axes.plot(line.x, line.y, linestyle=style.dash, color=style.color, linewidth=3.2 if bold else 1.7,
-                      marker=style.marker if self.marked else "", markersize=4.5, zorder=4 if bold else 3)  # fmt: skip
-        axes.set_ylim(low, high)
-        ends = {name: (_end(line.y), styles[name], name == self.bold) for name, line in self.lines.items()}
-        inside = _label_inside(axes, self.lines, styles, self.bold)
-        label_ends(axes, {n: end for n, end in ends.items() if np.isfinite(end[0]) and n not in inside}, (low, high))
-        if self.level is not None:
-            axes.axhline(self.level[0], color=INK, linestyle=(0, (1, 2)), linewidth=1.2)
-            far = [np.min([abs(np.log(abs(line.y[end]) / self.level[0])) for line in self.lines.values()
-                           if np.isfinite(line.y[end]) and line.y[end]] or [0.0]) for end in (0, -1)]  # fmt: skip
-            where, side = (0.01, "left") if far[0] > far[1] else (0.99, "right")
-            axes.text(where, self.level[0], self.level[1], transform=axes.get_yaxis_transform(), va="bottom", color=INK,
-                      ha=side, fontsize=font(axes.figure) - 1)  # type: ignore[arg-type]  # fmt: skip
-        for ring in self.rings:
-            axes.plot(ring.x, ring.y, "o", markersize=9, markerfacecolor="white", markeredgecolor=LOSS,
-                      markeredgewidth=2, zorder=6, clip_on=False)  # fmt: skip
-            words_at(axes, f" {ring.text}", ring.x, ring.y, color=LOSS, fontweight="bold",
-                     va="top" if ring.below else "bottom", zorder=7)  # fmt: skip
-        axes.set_xlabel(self.x_label, fontsize=font(axes.figure), color=INK)  # type: ignore[arg-type]
-
-
-def _end(y: Values) -> float:
-    """Return the last height that is known."""
-    known = y[np.isfinite(y)]
-    return float(known[-1]) if known.size else np.nan
-
-
-def _label_inside(axes: Axes, lines: Mapping[str, Line], styles: Mapping[str, Style], bold: str) -> set[str]:
-    """Write names whose lines end where others end at the place where their lines are farthest from all others."""
-    to_px = axes.transData.transform
-    (left, _), (right, high) = (to_px((axes.get_xlim()[end], axes.get_ylim()[end])) for end in (0, 1))
-    along = np.linspace(left + 0.06 * (right - left), left + 0.85 * (right - left), 60)
-    heights, last = dict[str, Values](), dict[str, float]()
-    for name, line in lines.items():
-        known = np.isfinite(line.y)
-        if known.any():
-            px = to_px(np.column_stack([line.x[known], np.clip(line.y[known], *axes.get_ylim())]))
-            heights[name], last[name] = np.interp(along, px[:, 0], px[:, 1], np.nan, np.nan), float(px[-1, 1])
-    written, size = list[tuple[float, float]](), font(axes.figure)  # type: ignore[arg-type]
-    inside = set[str]()
-    for name, mine in heights.items():
-        others = [height for other, height in heights.items() if other != name]
-        if not others or min(abs(last[name] - end) for other, end in last.items() if other != name) > 0.6 * size:
-            continue
-        near = np.nan_to_num(np.fmin.reduce([np.abs(mine - other) for other in others]))
-        for there, height in written:
-            near = np.where(np.abs(along - there) < 7 * size, np.minimum(near, np.abs(mine - height)), near)
-        half = 0.3 * size * len(name)
-        near = np.where(np.isfinite(mine) & (along > left + half) & (along < right - half), near, -1.0)
-        at = int(np.argmax(near))
-        if near[at] < 1.4 * size:
-            continue
-        above = high - mine[at] > 2 * size and not any(0 < other[at] - mine[at] < 3 * size for other in others)
-        x, y = axes.transData.inverted().transform((along[at], mine[at] + (0.4 if above else -0.4) * size))
-        words_at(axes, name, float(x), float(y), color=styles[name].ink, ha="center", va="bottom" if above else "top",
-                 fontweight="bold" if name == bold else "normal", zorder=7)  # fmt: skip
-        written.append((float(along[at]), float(mine[at])))
-        inside.add(name)
-    return inside
-
-
-def _inside(axes: Axes, x: float, y: float) -> tuple[float, float]:
-    """Return the data at shares of the axes."""
-    there = axes.transData.inverted().transform(axes.transAxes.transform((x, y)))
-    return float(there[0]), float(there[1])
-
-
-@dataclass(frozen=True)
-class Curves:
-    """Curves over wavelength, with the lamps behind them and names at their peaks.
-
-    `edges`: wavelengths to mark, nm.
-    """
-
-    title: str
-    wavelength_nm: Values
-    curves: Mapping[str, Values]
-    lamps: Mapping[str, Values]
-    colors: Mapping[str, str]
-    bold: tuple[str, ...] = ()
-    dashed: tuple[str, ...] = ()
-    edges: tuple[float, ...] = ()
-    height: float = 320
-
-    def room(self, *, wide: bool) -> tuple[float, float]:  # noqa: ARG002
-        """Numbers on the left."""
-        return LEFT, 6
-
-    def tall(self, *, wide: bool) -> float:
-        """As stated, or lower."""
-        return self.height if wide else 230
-
-    def draw(self, axes: Axes) -> None:
-        """Draw lamps, curves and names."""
-        size, nm = font(axes.figure), self.wavelength_nm  # type: ignore[arg-type]
-        top = max([1e-9, *(float(curve.max()) for curve in self.curves.values())])
-        axes.set_xlim(float(nm[0]), float(nm[-1]))
-        axes.set_ylim(0, 1.22 * top if self.edges else 1.12 * top)
-        for kind, lamp in self.lamps.items():
-            axes.fill_between(nm, 1.06 * top * lamp, color=LAMPS.get(kind, "#bbbbbb"), alpha=0.45, linewidth=0)
-        for name, curve in self.curves.items():
-            bold = name in self.bold
-            axes.plot(nm, curve, color=self.colors[name], linewidth=3.2 if bold else 1.7, zorder=4 if bold else 3,
-                      linestyle=(0, (5, 2)) if name in self.dashed else "-")  # fmt: skip
-            others = [other for known, other in self.curves.items() if known != name]
-            apart = np.min([np.abs(curve - other) for other in others], axis=0) if others else curve
-            margin = min(8, (nm.size - 1) // 4)
-            at = int(np.argmax(np.where(curve > 0.25 * top, apart, -1.0)[margin : nm.size - margin])) + margin
-            above = all(curve[at] >= other[at] for other in others) or apart[at] > 0.1 * top
-            words_at(axes, name, float(nm[at]), float(curve[at]), color=self.colors[name], ha="center",
-                     fontweight="bold" if bold else "normal", va="bottom" if above else "top", zorder=5)  # fmt: skip
-        for edge in self.edges:
-            axes.axvline(edge, color=GAIN, linestyle=(0, (2, 2)), linewidth=1.2)
-        for edge, side in zip(self.edges, ("right", "left") * len(self.edges), strict=False):
+            low, high, words = self.zone
+            axes.axhspan(low, high, color="#fbeee8", linewidth=0, zorder=0)
+            middle = np.sqrt(low * high) if self.y.log else (low + high) / 2
             axes.text(
-                edge, 1.17 * top, f" {edge:.0f} nm ", ha=side, va="bottom", color=GAIN, fontsize=size, fontweight="bold"
+                0.02, middle, words, transform=axes.get_yaxis_transform(), color=LOSS, va="center", fontsize=FONT - 1
             )
-        axes.set_xlabel("wavelength / nm", fontsize=size, color=INK)
+        _name_ends(axes, ends)
 
 
 @dataclass(frozen=True)
-class Map:
-    """Heights over two numbers, with levels and a marked place; NaN where nothing is known or allowed.
+class Points(Panel):
+    """A point for each name, groups of dots, a cloud of designs, a front, and a bound."""
 
-    `levels`: heights and their words; `mark`: place and words.
-    """
-
-    title: str
-    x_label: str
-    y_label: str
-    x: Float[Array, " columns"]
-    y: Float[Array, " rows"]
-    z: Float[Array, "rows columns"]
-    levels: tuple[tuple[float, str], ...] = ()
-    mark: tuple[float, float, str] | None = None
-    most: float | None = None
-    height: float = 340
-
-    def room(self, *, wide: bool) -> tuple[float, float]:  # noqa: ARG002
-        """Numbers on the left."""
-        return LEFT, 12
-
-    def tall(self, *, wide: bool) -> float:
-        """As stated, or lower."""
-        return self.height if wide else 270
+    points: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    groups: Mapping[str, Pairs] = field(default_factory=dict)
+    cloud: Pairs | None = None
+    front: Pairs | None = None
+    bound: Pairs | None = None
 
     def draw(self, axes: Axes) -> None:
-        """Draw heights, levels and the mark."""
+        """Draw points, each with its name where no other stands."""
+        styles = styles_of([*self.points, *self.groups])
+        if self.cloud is not None:
+            axes.plot(*self.cloud, ".", color=_SWEPT, markersize=5, zorder=2)
+        if self.front is not None:
+            color = styles[self.bold].color if self.bold in styles else GAIN
+            axes.plot(*self.front, color=color, linewidth=1.7, zorder=3)
+        if self.bound is not None:
+            axes.plot(*self.bound, color=DIM, linestyle=(0, (4, 3)), linewidth=1.2, zorder=2)
+            at = len(self.bound[0]) // 2
+            place = float(self.bound[0][at]), float(self.bound[1][at])
+            axes.annotate("proven", place, (0, 5), textcoords="offset points", color=DIM, fontsize=FONT - 1)
+        shown = {name: (float(np.clip(x, self.x.low, self.x.high)), y) for name, (x, y) in self.points.items()}
+        used = [(x - 7, x + 7, y) for x, y in axes.transData.transform([*shown.values()] or np.empty((0, 2)))]
+        for name, (x, y) in self.groups.items():
+            style = Style(LAMPS[name]) if name in LAMPS else styles[name]
+            axes.plot(x, y, "o", color=style.color, markersize=5, alpha=0.85, markeredgewidth=0, gid=_gid(name))
+            self._name(axes, _cut(name), float(np.median(x)), float(np.median(y)), style, used)
+        if self.cloud is not None:
+            at = int(np.argmax(self.cloud[0]))
+            place = float(self.cloud[0][at]), float(self.cloud[1][at])
+            self._name(axes, "swept", *place, Style(_SWEPT), used)
+        for name, (across, height) in self.points.items():
+            drawn, bold = shown[name][0], name == self.bold
+            axes.plot(
+                drawn, height, styles[name].marker, color=styles[name].color, markersize=13 if bold else 8, zorder=5,
+                markeredgecolor="white", gid=_gid(name), clip_on=False,
+            )  # fmt: skip
+            beyond = f" ({'◂' if across < drawn else '▸'} {amount(across, self.x.unit)})" if across != drawn else ""
+            words = f"{_cut(name)} {amount(height, self.y.unit)}{beyond}"
+            self._name(axes, words, drawn, height, styles[name], used, bold=bold)
+
+    @staticmethod
+    def _name(
+        axes: Axes,
+        words: str,
+        x: float,
+        y: float,
+        style: Style,
+        used: list[tuple[float, float, float]],
+        *,
+        bold: bool = False,
+    ) -> None:
+        """Write words beside a point, at the nearest height where they meet neither a point nor other words."""
+        across, up = axes.transData.transform((x, y))
+        left = across > axes.bbox.x0 + 0.6 * axes.bbox.width
+        begin = across - 9 - _LETTER * len(words) if left else across + 9
+        end = begin + _LETTER * len(words)
+        known = [height for first, last, height in used if first < end and last > begin]
+        moves = sorted(range(-120, 121, 3), key=lambda move: (abs(move), move))
+        inside = [move for move in moves if axes.bbox.y0 < up + move < axes.bbox.y1] or [0]
+        free = (move for move in inside if all(abs(up + move - height) >= _APART for height in known))
+        move = next(free, inside[0])
+        used.append((begin, end, up + move))
+        line = {"arrowstyle": "-", "color": "#9a9ea4", "linewidth": 0.8, "shrinkB": 4}
+        axes.annotate(
+            words.replace(NARROW, " "), (x, y), (-9 if left else 9, move), textcoords="offset pixels",
+            ha="right" if left else "left", va="center", color=style.ink, fontsize=FONT,
+            fontweight="bold" if bold else "normal", zorder=6, arrowprops=line if abs(move) > _APART else None,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Curves(Panel):
+    """Curves over wavelength before the spectra of the lamps; `edges` are marked, nm."""
+
+    nm: Values = field(default_factory=lambda: np.empty(0))
+    curves: Mapping[str, Values] = field(default_factory=dict)
+    lamps: Mapping[str, Values] = field(default_factory=dict)
+    edges: Sequence[float] = ()
+    color: str = GAIN
+    dashed: Sequence[str] = ()
+
+    def draw(self, axes: Axes) -> None:
+        """Draw lamps, curves, and their names where other curves are far."""
+        for kind, lamp in self.lamps.items():
+            axes.fill_between(
+                self.nm, 0.96 * self.y.high * lamp, color=LAMPS.get(kind, "#bbbbbb"), alpha=0.45, linewidth=0
+            )
+        for name, curve in self.curves.items():
+            bold = name == self.bold
+            color = self.color if bold else CHANNELS.get(name, DIM)
+            dash = (0, (5, 2)) if name in self.dashed else "-"
+            axes.plot(
+                self.nm, curve, color=color, linewidth=3.2 if bold else 1.7, linestyle=dash, zorder=4 if bold else 3
+            )
+            others = [other for key, other in self.curves.items() if key != name]
+            free = np.min([np.abs(curve - other) for other in others], axis=0) if others else curve
+            inner = slice(len(curve) // 20, len(curve) - len(curve) // 20)
+            at = inner.start + int(np.argmax(np.where(curve > 0.25 * curve.max(), free, -1.0)[inner]))
+            weight = "bold" if bold else "normal"
+            axes.text(
+                self.nm[at],
+                curve[at],
+                _cut(name),
+                color=color,
+                ha="center",
+                va="bottom",
+                fontsize=FONT,
+                fontweight=weight,
+            )
+        for at, edge in enumerate(edge for edge in self.edges if self.x.low <= edge <= self.x.high):
+            axes.axvline(edge, color=self.color, linestyle=(0, (2, 2)), linewidth=1.2)
+            axes.text(
+                edge,
+                self.y.high,
+                f" {edge:.0f} nm ",
+                ha="right" if self.x.percent(edge) > _FAR else _EDGES[at % 2],
+                va="top",
+                color=self.color,
+                fontsize=FONT,
+                fontweight="bold",
+            )
+
+
+@dataclass(frozen=True)
+class Map(Panel):
+    """Heights over two numbers, with a level and a marked place."""
+
+    across: Values = field(default_factory=lambda: np.empty(0))
+    up: Values = field(default_factory=lambda: np.empty(0))
+    heights: Float[Array, "up across"] = field(default_factory=lambda: np.empty((0, 0)))
+    level: tuple[float, str] | None = None
+    mark: tuple[float, float] | None = None
+    most: float | None = None
+
+    def draw(self, axes: Axes) -> None:
+        """Draw heights, level and mark; where there is none it is gray."""
         from matplotlib.colors import LinearSegmentedColormap  # noqa: PLC0415  (slow to import)
 
-        blues = LinearSegmentedColormap.from_list("heights", ["#eef4fc", "#9dc0ee", "#4f8add", "#065dcb", "#04408c"])
-        size = font(axes.figure)  # type: ignore[arg-type]
         axes.set_facecolor("#eeeeee")
         axes.grid(visible=False)
-        axes.imshow(
-            self.z, cmap=blues, origin="lower", aspect="auto", interpolation="nearest", vmin=0, vmax=self.most,
-            extent=(*_outer(self.x), *_outer(self.y)),
-        )  # fmt: skip
-        for level, words in self.levels:
-            if min(self.z.shape) > 1 and np.nanmin(self.z) < level <= np.nanmax(self.z):
-                drawn = axes.contour(self.x, self.y, self.z, levels=[level], colors=INK, linewidths=1.4)
-                axes.clabel(drawn, fmt=words, fontsize=size - 2)
+        colors = LinearSegmentedColormap.from_list("heights", list(_BLUES))
+        axes.pcolormesh(
+            self.across, self.up, self.heights, cmap=colors, vmin=0, vmax=self.most, shading="nearest", rasterized=True
+        )
+        if self.level is not None and np.nanmin(self.heights) < self.level[0] < np.nanmax(self.heights):
+            drawn = axes.contour(self.across, self.up, self.heights, levels=[self.level[0]], colors=INK, linewidths=1.4)
+            axes.clabel(drawn, fmt=self.level[1], fontsize=FONT - 1)
         if self.mark is not None:
-            axes.plot(*self.mark[:2], "*", color="white", markersize=15, markeredgecolor=INK)
-            axes.annotate(
-                self.mark[2], self.mark[:2], xytext=(8, 8), textcoords="offset points", fontsize=size, color=INK,
-                fontweight="bold", bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1},
-            )  # fmt: skip
-        axes.set_xlabel(self.x_label, fontsize=size, color=INK)
-        axes.set_ylabel(self.y_label, fontsize=size, color=INK)
+            axes.plot(*self.mark, "*", color="white", markersize=15, markeredgecolor=INK)
 
 
-def _outer(values: Values) -> tuple[float, float]:
-    """Return the outer ends of cells around equidistant numbers."""
-    half = (float(values[-1]) - float(values[0])) / max(1, len(values) - 1) / 2 or 0.5
-    return float(values[0]) - half, float(values[-1]) + half
+def _gid(name: str) -> str:
+    return f"design:{name}"
+
+
+def _cut(name: str) -> str:
+    return name if len(name) <= _MOST_LETTERS else f"{name[: _MOST_LETTERS - 1]}…"
+
+
+def _name_ends(axes: Axes, ends: Mapping[str, tuple[float, Style, bool]]) -> None:
+    """Write names right of the axes at the heights of their lines' ends, pushed apart."""
+    order, right = sorted(ends, key=lambda name: ends[name][0]), axes.get_xlim()[1]
+    low, height = axes.bbox.y0, axes.bbox.height
+    heights = [float(np.clip(axes.transData.transform((right, ends[name][0]))[1] - low, 0, height)) for name in order]
+    for name, at in zip(order, spread(heights, _APART, height), strict=True):
+        _, style, bold = ends[name]
+        axes.annotate(
+            _cut(name), (1, at / height), (8, 0), xycoords="axes fraction", textcoords="offset points", va="center",
+            color=style.ink, fontsize=FONT, fontweight="bold" if bold else "normal", annotation_clip=False,
+        )  # fmt: skip
+
+
+def spread(heights: Sequence[float], least: float, most: float) -> list[float]:
+    """Return rising heights moved as little as needed to be apart, from 0 to `most` where there is room."""
+    placed = list(heights)
+    for _ in range(400):
+        near = [at for at in range(len(placed) - 1) if placed[at + 1] - placed[at] < least - 0.01]
+        if not near:
+            break
+        for at in near:
+            push = (least - placed[at + 1] + placed[at]) / 2
+            placed[at], placed[at + 1] = placed[at] - push, placed[at + 1] + push
+        placed = [min(max(at, 0.0), most) for at in placed]
+    return placed
+
+
+def figure_of(panel: Panel) -> Figure:
+    """Draw a panel."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415  (slow to import)
+    from matplotlib.figure import Figure  # noqa: PLC0415
+    from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator  # noqa: PLC0415
+
+    figure = Figure(figsize=(WIDTH / 72, HEIGHT / 72), dpi=72)
+    FigureCanvasAgg(figure)
+    ticks = panel.y_ticks
+    left = 16 + 8.2 * max((len(words) for _, words in ticks), default=3)
+    bounds = left / WIDTH, 52 / HEIGHT, (WIDTH - left - panel.room) / WIDTH, (HEIGHT - 90) / HEIGHT
+    axes = figure.add_axes(bounds)
+    axes.grid(visible=True, color=GRID, linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color("#9a9ea4")
+    axes.set(xscale="log" if panel.x.log else "linear", yscale="log" if panel.y.log else "linear")
+    axes.set(xlim=(panel.x.low, panel.x.high), ylim=(panel.y.low, panel.y.high))
+    if panel.y.level is not None:
+        axes.axhline(panel.y.level, color=INK, linestyle=(0, (1, 2)), linewidth=1.2, zorder=1)
+    panel.draw(axes)
+    for axis, known in ((axes.xaxis, panel.x.ticks), (axes.yaxis, ticks)):
+        axis.set_major_locator(FixedLocator([at for at, _ in known]))
+        axis.set_major_formatter(FixedFormatter([words for _, words in known]))
+        axis.set_minor_locator(NullLocator())
+    axes.tick_params(colors=DIM, labelsize=FONT - 1, length=0, pad=5)
+    axes.set_xlabel(panel.x.label, fontsize=FONT, color=INK)
+    size = FONT * min(1.0, _TITLE / max(1, len(panel.title)))
+    figure.text(0.004, 0.985, panel.title, va="top", fontsize=size, fontweight="bold", color=INK)
+    return figure
+
+
+def svg(panel: Panel, name: str) -> str:
+    """Return a panel as SVG; equal panels give equal texts."""
+    import matplotlib as mpl  # noqa: PLC0415  (slow to import)
+
+    buffer = io.StringIO()
+    settings: Any = {
+        "svg.hashsalt": name,
+        "svg.fonttype": "none",
+        "font.family": "sans-serif",
+        "text.parse_math": False,
+    }
+    with mpl.rc_context(settings), _without_warnings():
+        figure_of(panel).savefig(buffer, format="svg", dpi=72, metadata={"Date": None})
+    text = buffer.getvalue()
+    text = re.sub(r"<metadata>.*?</metadata>\s*|<!--.*?-->", "", text[text.index("<svg") :], flags=re.DOTALL)
+    text = re.sub(r"(\d+\.\d{2})\d+", r"\1", text)
+    text = re.sub(r'(id="|url\(#|href="#)(?!design:)', rf"\g<1>{name}-", text)
+    names = 'xmlns:xlink="http://www.w3.org/1999/xlink"'
+    head = f'<svg role="img" aria-label="{escape(panel.title)}" viewBox="0 0 {WIDTH} {HEIGHT}" {names}>'
+    return re.sub(r"<svg [^>]*>", lambda _: head, text, count=1)
+
+
+def png(panels: Sequence[Panel], columns: int = 2) -> bytes:
+    """Return panels beside each other as one PNG, of twice their size."""
+    import matplotlib as mpl  # noqa: PLC0415  (slow to import)
+    from PIL import Image  # noqa: PLC0415
+
+    images = []
+    for panel in panels:
+        buffer = io.BytesIO()
+        with mpl.rc_context({"text.parse_math": False}), _without_warnings():
+            figure_of(panel).savefig(buffer, format="png", dpi=144)
+        images.append(Image.open(buffer).convert("RGB"))
+    columns = min(columns, len(images))
+    sheet = Image.new("RGB", (2 * WIDTH * columns, 2 * HEIGHT * -(-len(images) // columns)), "white")
+    for at, image in enumerate(images):
+        sheet.paste(image, (2 * WIDTH * (at % columns), 2 * HEIGHT * (at // columns)))
+    buffer = io.BytesIO()
+    sheet.quantize(256, dither=Image.Dither.NONE).save(buffer, format="png", optimize=True)
+    return buffer.getvalue()
+
+
+def _without_warnings() -> warnings.catch_warnings[None]:
+    """Let Matplotlib say nothing of letters that a font lacks, or of an axis of one value."""
+    return warnings.catch_warnings(action="ignore")
+
+
+@dataclass(frozen=True)
+class Section:
+    """One question: panels, a table, a note."""
+
+    title: str
+    table: Table | None = None
+    panels: tuple[Panel, ...] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A kind of answer with what its sentence needs beside the table of its section, and further sections."""
+
+    kind: str
+    section: Section
+    facts: Mapping[str, Any]
+    more: Sequence[Section] = ()

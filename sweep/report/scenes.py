@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import pandas as pd
 
 from ..camera.plan import Choice, Plan
-from ..results.facts import EffectFacts
 from ..study import Study
-from .pages import aligned
-from .words import inward
-
-_FASTER = 1.05
-"""Less is noise of the measurement."""
+from .numbers import inward
+from .sections import left_out_words
+from .tables import aligned
 
 
 def effect_table(effects: Sequence[Choice]) -> pd.DataFrame:
@@ -32,28 +29,6 @@ def effect_table(effects: Sequence[Choice]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def left_out_in_words(
-    effects: Iterable[Choice | EffectFacts], risk_dn: float, tolerance_dn: float, seconds: tuple[float, float] | None
-) -> str:
-    """Return how many effects no scene computes, the DN at risk, and the time that this saves.
-
-    `effects`: those of all plans; `seconds`: of all rows as planned and with every effect, s; None where no bound
-    leaves an effect out.
-    """
-    effects = list(effects)
-    left_out = {one.effect for one in effects} - {one.effect for one in effects if one.computed}
-    if not risk_dn:
-        return f"Left out: {len(left_out)} effects that no scene has; 0 of {tolerance_dn:g} DN at risk."
-    text = f"Left out: {len(left_out)} effects, at most {inward(risk_dn, up=True, digits=2):.2g} of {tolerance_dn:g} DN"
-    if seconds is None:
-        return f"{text}."
-    own_s, all_s = seconds
-    faster = (
-        f"{all_s / own_s:.2g} times faster, {all_s - own_s:.2g} s saved" if all_s > _FASTER * own_s else "no faster"
-    )
-    return f"{text}, {faster}."
-
-
 def plan_lines(study: Study, seconds: tuple[float, float] | None) -> Iterator[str]:
     """Yield the effects of every scene with bound and reason; scenes of one plan together.
 
@@ -67,7 +42,7 @@ def plan_lines(study: Study, seconds: tuple[float, float] | None) -> Iterator[st
         several = f" ... {plans[-1].scenario} ({len(plans)} scenes)" if len(plans) > 1 else ""
         yield (
             f"{plans[0].scenario}{several}: what is left out changes a CSD by at most "
-            f"{inward(left_out_dn, up=True, digits=2):.2g} DN (tolerance {plans[0].tolerance_dn:g} DN)"
+            f"{inward(left_out_dn, 2, up=True):.2g} DN (tolerance {plans[0].tolerance_dn:g} DN)"
         )
         effects = zip(*(plan.choices for plan in plans), strict=True)
         largest = [max(choices, key=lambda choice: choice.bound_dn or 0.0) for choices in effects]
@@ -75,7 +50,9 @@ def plan_lines(study: Study, seconds: tuple[float, float] | None) -> Iterator[st
         yield ""
     every = study.plans.values()
     risk_dn, tolerance_dn = max(plan.error_bound_dn for plan in every), max(plan.tolerance_dn for plan in every)
-    yield left_out_in_words((choice for plan in every for choice in plan.choices), risk_dn, tolerance_dn, seconds)
+    choices = [choice for plan in every for choice in plan.choices]
+    left_out = {one.effect for one in choices} - {one.effect for one in choices if one.computed}
+    yield f"Left out: {left_out_words(len(left_out), risk_dn, tolerance_dn, seconds)}."
     settings = ", ".join(f"{name} {value}" for name, value in study.section.accuracy.model_dump().items())
     yield f"{len(study.plans)} scenes, {len(groups)} different plans. Accuracy: {settings}."
 

@@ -1,24 +1,28 @@
-"""Benchmark of vision of a run: errors of each design and reader, and their predictors, with intervals."""
+"""Benchmark of vision of a run: errors of each design and reader, and their predictors, with intervals, as tables."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy.stats import rankdata
 
 from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int
-from ..metrics.share import format_share
 from ..results.output import Output
-from ..results.tables import RGGB, VISION, VISION_CONDITIONS, VISION_LEARNING
+from ..results.tables import RGGB, VISION, VISION_CONDITIONS, VISION_LEARNING, VISION_STREET
+from ..vision.detections import ALL, precision_scores
 from ..vision.readers import OBSERVER
 from ..vision.scenes import NETWORK, PROTOTYPES, SHUFFLED, UNSEEN, states_of
 from ..vision.scores import Interval, confusion_matrix, interval_of_seeds, mean_of
 from ..vision.section import Vision
+from .numbers import SHARE, amount
+from .panels import INK, Answer, Lines, Section, axis_over
+from .run import Run, words_of
+from .tables import Axis, Column, Marks, Table
 
 READER_NAMES = {
     OBSERVER: "ideal observer",
@@ -144,19 +148,6 @@ def benchmark_of(output: Output) -> Benchmark:
     return output.cached("vision", lambda: Benchmark(vision, output.study.seed, *tables))
 
 
-def format_interval(interval: Interval) -> str:
-    """Format a value with its interval."""
-    return f"{interval.value:.2f} ({interval.low:.2f} to {interval.high:.2f})"
-
-
-def format_percent(interval: Interval) -> str:
-    """Format a share with its interval, in percent, without the sign."""
-    value, low, high = (
-        format_share(share).removesuffix("%") for share in (interval.value, interval.low, interval.high)
-    )
-    return f"{value} ({low} to {high})"
-
-
 @dataclass(frozen=True)
 class Ranks:
     """Rank correlations of each of `PREDICTORS` with the rarity of a reader's errors: 1 predicts every order.
@@ -261,3 +252,159 @@ def _spearman(x: Float[Array, "draws values"], y: Float[Array, "draws values"]) 
     scale = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))
     out = np.full(len(a), np.nan)
     return np.asarray(np.divide((a * b).sum(axis=1), scale, out=out, where=scale > 0), dtype=float)
+
+
+_MOST_LEVELS = 3
+
+
+def vision_answer(run: Run) -> Answer:
+    """Return how often readers err with each design, how the separation ranks designs, streets, and lessons."""
+    benchmark = benchmark_of(run.output)
+    reader = benchmark.main_reader
+    ranks = ranks_of(benchmark, reader)
+    errors = {
+        "wrong": (READER_NAMES[reader], {name: benchmark.error(name, reader, SHUFFLED) for name in benchmark.designs}),
+        "apart": (f"less that of {benchmark.reference}", {
+            name: benchmark.difference(name, SHUFFLED) for name in benchmark.designs if name != benchmark.reference
+        }),
+        **{other: (READER_NAMES[other], {name: benchmark.error(name, other, SHUFFLED) for name in benchmark.designs})
+           for other in benchmark.readers if other != reader},
+    }  # fmt: skip
+    columns: dict[str, tuple[Column, Mapping[str, Any]]] = {
+        key: _shares(label, intervals) for key, (label, intervals) in errors.items()
+    }
+    columns["wrong_alone"] = (
+        Column("wrong", SHARE, "less"),
+        {name: error.value for name, error in errors["wrong"][1].items()},
+    )
+    hero = (
+        run.hero
+        if run.hero in benchmark.designs
+        else min(benchmark.designs, key=lambda name: errors["wrong"][1][name].value)
+    )
+    table = Table.of(columns, reference=benchmark.reference, hero=hero)
+    lead = Section(
+        "Images read wrongly",
+        table,
+        tuple(_over_distance(benchmark, ranks, hero)),
+        "Unseen lamps, lenses in any order.",
+    )
+    between = ranks_of(benchmark, OBSERVER).between.get("csd")
+    least = min(((name, one.value) for name, one in errors["wrong"][1].items()), key=lambda of: of[1])
+    observer = benchmark.error(hero, OBSERVER, SHUFFLED)
+    facts = {
+        "fewest": f"{amount(least[1], SHARE)} with {least[0]}", "least": amount(observer.value, SHARE),
+        "reader": READER_NAMES[reader], "by": READER_NAMES[OBSERVER], "quantity": words_of(run.goal),
+        "rank": "unknown" if between is None else f"{between.value:.2f} ({between.low:.2f} to {between.high:.2f})",
+    }  # fmt: skip
+    return Answer(
+        "vision", lead, facts, [*_predictors(benchmark, ranks), *_streets(run, benchmark), *_lessons(benchmark)]
+    )
+
+
+def _shares(label: str, intervals: Mapping[str, Interval], group: str = "wrong") -> tuple[Column, dict[str, Marks]]:
+    """Return shares with their intervals as a track."""
+    ends = [end for one in intervals.values() for end in (one.low, one.high)]
+    axis = Axis("", SHARE, min(0.0, *ends), max(1e-3, *ends), level=0.0 if min(ends) < 0 else None)
+    cells = {
+        name: Marks(
+            [(one.low, one.high)],
+            [(one.value, INK)],
+            f"{100 * one.value:.1f} ({100 * one.low:.1f} to {100 * one.high:.1f})\u00a0%",
+        )
+        for name, one in intervals.items()
+    }
+    return Column(label, SHARE, axis=axis, group=group), cells
+
+
+def _over_distance(benchmark: Benchmark, ranks: Ranks, hero: str) -> list[Lines]:
+    """Return errors over distance, a panel for each light, with bands down to the ideal observer."""
+    panels, rows = [], ranks.conditions
+    for level, of in list(benchmark.vision.levels.items())[:_MOST_LEVELS]:
+        here, lines, floors = rows[rows["level"] == level].sort_values("distance_m"), {}, {}
+        for design, line in here.groupby("design", sort=False):
+            lines[str(design)] = line["distance_m"].to_numpy(dtype=float), line["error"].to_numpy(dtype=float)
+            if OBSERVER in line:
+                floors[str(design)] = line[OBSERVER].to_numpy(dtype=float)
+        across = axis_over("distance", "m", here["distance_m"], zero=False, log=False)
+        up = axis_over("", SHARE, here["error"], log=False)
+        panels.append(
+            Lines(f"Wrong / %: {level}, {of.illuminance_lx:g} lx", across, up, hero, lines=lines, floors=floors)
+        )
+    return panels
+
+
+def _predictors(benchmark: Benchmark, ranks: Ranks) -> list[Section]:
+    """Return how each predictor ranks designs and conditions by a reader's errors."""
+    columns = {
+        "between": _correlations("between designs", ranks.between),
+        "everywhere": _correlations("designs, distances and levels", ranks.everywhere),
+    }
+    note = f"Rank correlation with the rarity of errors of the {READER_NAMES[benchmark.main_reader]}; 1: every order."
+    table = Table.of(columns, head="predictor")
+    return [Section("What predicts errors", table, note=note)] if table.rows else []
+
+
+def _correlations(label: str, known: Mapping[str, Interval]) -> tuple[Column, dict[str, Marks]]:
+    cells = {
+        PREDICTORS[name]: Marks(
+            [(one.low, one.high)], [(one.value, INK)], f"{one.value:.2f} ({one.low:.2f} to {one.high:.2f})"
+        )
+        for name, one in known.items()
+    }
+    return Column(label, axis=Axis("", "", -1.0, 1.0, level=0.0)), cells
+
+
+def _streets(run: Run, benchmark: Benchmark) -> list[Section]:
+    """Return the average precision of the simplest detector in streets."""
+    if VISION_STREET not in run.output.vision:
+        return []
+    scores = precision_scores(run.output.vision[VISION_STREET], benchmark.reference)
+    rows = scores[scores["level"] == ALL].to_dict("records")
+    precision = {str(row["name"]): float(row["average_precision"]) for row in rows}
+    apart = {
+        str(row["name"]): f"{row['apart']:+.3f} ({row['apart_low']:+.3f} to {row['apart_high']:+.3f})".replace(
+            "-", "\u2212"
+        )
+        for row in rows
+        if row["name"] != benchmark.reference
+    }
+    columns: dict[str, tuple[Column, Mapping[str, Any]]] = {
+        "precision": (Column("average precision", "", "more"), precision),
+        "apart": (Column(f"less that of {benchmark.reference}"), apart),
+    }
+    return [
+        Section(
+            "Streets, read by the simplest detector", Table.of(columns, reference=benchmark.reference, hero=run.hero)
+        )
+    ]
+
+
+def _lessons(benchmark: Benchmark) -> list[Section]:
+    """Return errors of readers over the ideal observer's, over the images that they have learned from."""
+    lessons, panels = lessons_of(benchmark), []
+    for reader in benchmark.learners:
+        own = [lesson for lesson in lessons if lesson.reader == reader]
+        images = np.array([float(lesson.images) for lesson in own])
+        lines = {name: (images, np.array([lesson.times[name] for lesson in own])) for name in benchmark.designs}
+        every = np.concatenate([line for _, line in lines.values()])
+        across, up = axis_over("images learned from", "", images, log=True), axis_over("", "", every, log=True)
+        panels.append(Lines(f"{READER_NAMES[reader]}: times the ideal observer's error", across, up, lines=lines))
+    rows = {
+        f"{READER_NAMES[lesson.reader]}, {lesson.images:,} images": {
+            "times": _ends([t for t in lesson.times.values() if np.isfinite(t)]), "csd": lesson.csd.value,
+        }
+        for lesson in lessons
+    }  # fmt: skip
+    columns = {
+        "times": (Column("times the ideal observer's error"), {name: row["times"] for name, row in rows.items()}),
+        "csd": (
+            Column("rank correlation of the separation", "", "more"),
+            {name: row["csd"] for name, row in rows.items()},
+        ),
+    }
+    return [Section("What a reader learns", Table.of(columns, head="reader"), tuple(panels))] if lessons else []
+
+
+def _ends(values: Sequence[float]) -> str:
+    return f"{min(values):.2f} to {max(values):.2f}" if values else ""

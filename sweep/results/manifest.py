@@ -133,7 +133,7 @@ class Manifest:
 
         `columns`: columns; left out, all of them. Raises OutputError if a part is missing or damaged.
         """
-        for name in sorted(name for name in self.files if name.startswith(f"{RESULTS}/")):
+        for name in sorted(name for name in self.files if name.startswith(f"{RESULTS}/") and is_of_run(name)):
             self.require([name])
             yield read_table(self.path(name), columns)
 

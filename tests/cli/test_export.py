@@ -12,8 +12,8 @@ from scipy.integrate import trapezoid
 from scipy.io import loadmat
 
 import sweep
+from sweep.api.export import export, relative_transmission
 from sweep.base.errors import OutputError, SweepError
-from sweep.report.export import export, relative_transmission
 from sweep.results.dataset import part_paths
 from sweep.runs.audit import audit
 from sweep.spectra.filter_files import color_hints, csv_text, unique_names

@@ -113,8 +113,8 @@ search: {starts: 3, max_evaluations: 150}
 ROOM = """\
 import sys, sweep.metrics.columns as room
 room.__path__.append(sys.argv.pop(1))
-from sweep.report.panels import Picture
-Picture.svgs, Picture.files = lambda *_: ("", ""), lambda *_: {}
+from sweep.report import page
+page.svg, page.pictures_of = lambda *_: "", lambda *_: {}
 from sweep.cli.app import main
 main()
 """

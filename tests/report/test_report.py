@@ -13,7 +13,10 @@ import pytest
 from sweep.base.errors import OutputError
 from sweep.metrics.pareto import knee
 from sweep.report import make_report, read_output, summary_lines
-from sweep.report.sections.clouds import Clouds
+from sweep.report.panels import Lines, Points, figure_of, svg
+from sweep.report.run import Run
+from sweep.report.sections import clouds
+from sweep.report.tables import Axis
 from sweep.results.dictionary import KEYS
 
 from ..build import STUDY, output_of
@@ -32,16 +35,16 @@ def test_the_knee_is_farthest_from_the_line_between_the_ends() -> None:
 
 
 def test_clouds_are_the_digital_numbers_of_all_lamps(finished: FinishedFolder) -> None:
-    output = read_output(finished("stopband"))
-    (clouds,) = Clouds.of(output)
-    assert isinstance(clouds, Clouds)
-    assert list(clouds.axes.items()) == [("RGGB", ("R", "G")), ("RYYCy", ("R", "Y")), ("best stopband", ("R", "N"))]
-    for name, (x, y) in clouds.axes.items():
-        (row,) = output.named_rows[output.named_rows["name"] == name]["design_id"]
-        points = output.points[output.points["design_id"] == row].set_index(["signal_type", "channel"])["dn"]
-        for kind, pair in clouds.clouds[name].items():
-            for channel, values in zip((x, y), pair, strict=True):
-                assert sorted(values) == sorted(points.loc[(kind, channel)])
+    run = Run(read_output(finished("stopband")))
+    (section,) = clouds(run)
+    panels = [panel for panel in section.panels if isinstance(panel, Points)]
+    channels = [("RGGB", "R", "G"), ("RYYCy", "R", "Y"), ("best stopband", "R", "N")]
+    for panel, (name, *pair) in zip(panels, channels, strict=True):
+        points = run.output.points[run.output.points["design_id"] == run.here[name]["design_id"]]
+        read = points.set_index(["signal_type", "channel"])["dn"]
+        for kind, values in panel.groups.items():
+            for channel, of in zip(pair, values, strict=True):
+                assert sorted(of) == sorted(read.loc[(kind, channel)])
 
 
 def test_every_column_of_the_rows_has_its_meaning(finished: FinishedFolder) -> None:
@@ -59,12 +62,26 @@ def test_no_design_dominates_one_of_the_front(finished: FinishedFolder) -> None:
 
 
 def test_a_dollar_in_a_name_is_no_formula() -> None:
-    from sweep.report.panels import Line, Lines, Picture
-
     x = np.linspace(400, 700, 4)
     for name in (r"$\nonsense{", "a$b$c"):
-        wide, _ = Picture((Lines(name, "x", {name: Line(x, x)}),), name).svgs("p")
-        assert f">{name}<" in wide
+        assert f">{name}<" in svg(
+            Lines(name, Axis("x", "", 400, 700), Axis("", "", 400, 700), lines={name: (x, x)}), "p"
+        )
+
+
+LONG = "a_name_of_" + 11 * "letters_ab"
+ONE, TWO = Axis("x", "", 0, 3), np.array([1.0, 2.0])
+NAMED = [
+    Lines("title", ONE, ONE, lines={LONG: (TWO, TWO), "short": (TWO, TWO / 2)}),
+    Points("title", ONE, ONE, points={LONG: (1.0, 2.0), "short": (2.0, 1.0)}),
+    Points("title", ONE, ONE, groups={LONG: (TWO, TWO)}),
+]
+
+
+@pytest.mark.parametrize("panel", NAMED)
+def test_the_longest_names_leave_room_for_the_axes(panel: Lines | Points) -> None:
+    (axes,) = figure_of(panel).axes
+    assert axes.get_position().width > 0.45
 
 
 def test_a_csv_has_every_digit_whatever_numpy_prints(tmp_path: Path) -> None:

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-import re
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sweep.base.errors import UpperBoundExceededError
-from sweep.report.leaders import leaders_of, upper_bound_beside
-from sweep.report.sections.scenes import Scenes
-from sweep.report.sections.trade_off import TradeOff
+from sweep.report.page import report_of
+from sweep.report.run import Run
+from sweep.report.tables import PROVEN
 from sweep.results.output import Output
 
-from ..build import output_of, sentences_of
+from ..build import output_of
 
-SHOWN = re.compile(
-    r"No filter in this pixel that stays below \w+ exceeds (?P<value>[\d.]+) DN under the same constraints \(proven"
-)
 CFAS = {
     "RYNCy": ("RYNCy: {}", "Y"),
     "RCCN": ("RCCN: {tile: [[R, C], [C, N]]}", "C"),
@@ -50,58 +47,43 @@ search: {{space: in_{searched}, scenario: {scenario}, starts: 2, max_evaluations
 
 
 def check_shown_bounds(output: Output) -> int:
-    """Check every upper bound that answer, limits and picture show; return how many the sentences show."""
-    search = output.provenance.search
+    """Check every upper bound that the page shows; return how many there are."""
+    search, run, shown = output.provenance.search, Run(output), 0
     assert search is not None
-    leaders, goal = leaders_of(output), output.goal.name
-    table, shown = output.table, 0
-    for text in sentences_of(output):
-        for match in SHOWN.finditer(text):
-            assert leaders.chosen is not None
-            assert (leaders.chosen["cfa"], leaders.chosen["scenario"]) == (search.cfa, search.scenario)
-            assert leaders.chosen[goal] <= float(match["value"])
-            shown += 1
-    for trade_off in TradeOff.of(output):
-        if trade_off.bounds is None:
-            continue
-        assert trade_off.cfa == search.cfa
-        rounding = math.sqrt(len(output.mosaic(search.cfa).channels))
-        rows = table[(table["scenario"] == search.scenario) & (table["cfa"] == search.cfa) & table["feasible"]]
-        levels, bounds = trade_off.bounds
-        for sensitivity, value in zip(100 * rows["cfa_sensitivity"], rows[goal], strict=True):
-            reached = bounds[levels <= sensitivity]
-            assert not reached.size or value <= reached[-1] + rounding
+    report = report_of(output)
+    for section in (report.lead, *report.sections):
+        for name, row in (section.table.rows if section.table else {}).items():
+            if name.startswith(PROVEN):
+                assert name.endswith(f"{search.channel} of {search.cfa}")
+                shown += 1
+                own = output.table[(output.table["scenario"] == run.scene) & (output.table["cfa"] == search.cfa)]
+                own = own[own["feasible"] & own["kind"].isin(["sweep", "search"])]
+                rounding = math.sqrt(len(output.mosaic(search.cfa).channels))
+                assert not len(own) or own[output.goal.name].max() <= row["goal"] + rounding  # type: ignore[operator]
     return shown
 
 
 GRID = "{left_nm: [600, 606, 612], left_width_nm: [6, 30], right_nm: [646, 652], right_width_nm: 7}"
 
 
-def test_the_bound_of_one_scenario_is_not_shown_beside_the_design_of_another(tmp_path: Path) -> None:
+def test_the_bound_of_one_scenario_is_not_shown_beside_the_designs_of_another(tmp_path: Path) -> None:
     text = study_text({"day": 2e-4, "night": 5e-3}, {"RYNCy": GRID}, "RYNCy", "day", 0.9)
     output = output_of(tmp_path, text)
     assert check_shown_bounds(output) >= 1
-    assert leaders_of(output).scenario == "day"  # the search's
-    bright = leaders_of(output, "night").chosen
-    assert bright is not None
-    assert bright[output.goal.name] > 2 * output.provenance.search.upper_bound_proven  # type: ignore[union-attr, operator]
-    (scenes,) = Scenes.of(output)
-    best = {scene.partition(":")[0]: design for scene, design, *_ in scenes.rows}
-    assert best["night"] == f"filter {bright['filter_id']} of RYNCy"
-    assert upper_bound_beside(output, bright) is None
+    assert Run(output).scene == "day"  # the search's
 
 
 def test_a_value_above_its_own_bound_is_an_error(tmp_path: Path) -> None:
     text = study_text({"chart": 2e-3}, {"RYNCy": GRID}, "RYNCy", "chart", 0.9)
     output = output_of(tmp_path, text)
-    row = output.best.iloc[0].to_dict()
     assert output.provenance.search is not None
     proven = output.provenance.search.upper_bound_proven
     assert proven is not None
-    assert upper_bound_beside(output, row) is not None
-    assert upper_bound_beside(output, row | {output.goal.name: proven + 0.5}) is None  # its rounding
-    with pytest.raises(UpperBoundExceededError, match="upper bound is"):
-        upper_bound_beside(output, row | {output.goal.name: proven + 3})
+    for above, raises in ((0.5, False), (3.0, True)):  # its rounding, and more
+        run = Run(output)
+        run.here[run.hero][output.goal.name] = proven + above
+        with pytest.raises(UpperBoundExceededError, match="upper bound is") if raises else nullcontext():
+            assert run.bound is not None
 
 
 @pytest.mark.parametrize("seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 60))])

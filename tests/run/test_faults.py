@@ -11,7 +11,6 @@ import pytest
 
 from sweep.base.errors import FailedDesignError, InterruptedRunError, OutputError, SweepError
 from sweep.report import read_output
-from sweep.report.page import limits_of
 from sweep.results.answers import ANSWERS
 from sweep.results.identity import CHUNK, run_facts
 from sweep.results.lock import locked
@@ -21,7 +20,7 @@ from sweep.runs.sweep import KILLED
 from sweep.runs.workers import workers
 from sweep.study import Study, load_study
 
-from ..build import ran, study_file
+from ..build import ran, study_file, text_of
 from ..mischief import assert_same_tables, half_done, mischievous, rows
 
 
@@ -79,7 +78,7 @@ def test_failing_designs_stop_a_run_or_are_tried_again(fewer: Study, unharmed: p
         run_study(study, folder, 1, lambda *_: None, options=RunOptions(fail_fast=True))
     assert run_study(study, folder, 1, lambda *_: None)
     failed = (rows(folder)["status"] != "ok").sum()
-    assert limits_of(read_output(folder))[0].startswith(f"Failed: {failed} rows")
+    assert f"failed: {failed:,} rows" in text_of(read_output(folder))
     assert failed == 2 * 2 * 6 * 2  # in both scenes, every design of this edge
     assert not run_study(study, folder, 1, lambda *_: None)
     wish.unlink()

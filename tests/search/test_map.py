@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from sweep.base.errors import StudyError
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.smooth import smooth_csd
 from sweep.report import read_output
-from sweep.report.bands import _widest, _width_at, map_lines
+from sweep.report.bands import _widest, _width_at, widest_bands
 from sweep.search.held import fix_parameters, search_held
 from sweep.study import load_study
 
@@ -65,16 +65,14 @@ def test_each_cell_is_the_best_of_a_fine_grid_of_amounts(folder: Path) -> None:
 
 def test_the_report_says_how_wide_a_band_may_be(folder: Path) -> None:
     output = read_output(folder / "out")
-    (line,) = map_lines(output)
-    found = re.search(r"of (\d+) nm FWHM \(rounded down\), near (\d+) nm", line)
-    assert found is not None
-    fwhm_nm, peak_nm = map(float, found.groups())
+    rggb = float(output.table[output.table["name"] == "RGGB"]["csd_yellow_red"].iloc[0])
+    band = widest_bands(output, {"RGGB": rggb})["RGGB"]
+    fwhm_nm, peak_nm = math.floor(band["fwhm_nm"]), round(band["peak_nm"])
     assert (fwhm_nm, peak_nm) == (44, 636)
     study = load_study(folder / "band.yaml")
     assert study.search is not None
     problem, names = study.problem(study.search), study.search.space.parameters
     held = fix_parameters(problem, {names.index("peak_nm"): peak_nm, names.index("fwhm_nm"): fwhm_nm})
-    rggb = output.table[output.table["name"] == "RGGB"]["csd_yellow_red"].iloc[0]
     assert search_held(held, "SLSQP", 60, 1).objective >= rggb
 
 

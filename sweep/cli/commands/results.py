@@ -100,7 +100,7 @@ def export(
         allowed = "--design best, or --images FOLDER (of some designs with --design)"
         raise SweepError(ValidationIssue("one of --design and --images", allowed=allowed))
     if design and images is None:
-        from ...report.export import export as exported
+        from ...api.export import export as exported
 
         answer = exported(
             folder,
@@ -112,7 +112,7 @@ def export(
             force=force,
         )
     else:
-        from ...report.export_images import export_images
+        from ...api.export_images import export_images
 
         assert images is not None
         with ProgressDisplay(quiet=quiet) as display:

@@ -1,1 +1,0 @@
-"""Sections of a report's page, in the order of the page."""
