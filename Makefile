@@ -1,6 +1,6 @@
 # make study NAME=stopband   run studies/stopband.yaml, results in outputs/stopband
 # make report NAME=stopband  draw the report of outputs/stopband again
-# make test                  install and run the tests, which take about five minutes on two cores
+# make test                  install and run the tests, which take about two minutes on two cores
 # make slow                  run the tests that take longer, and the other cases of these
 # make oldest                run the tests with the oldest versions that pyproject.toml allows, in .venv-oldest
 # make mutants               plant faults of meaning, one at a time, and say which test sees each
