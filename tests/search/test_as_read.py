@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -15,6 +16,7 @@ from sweep.designs.ungridded import PairedDesigns
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.metrics.quantity import DN, Quantity
+from sweep.runs.as_read import Reading, verdicts
 from sweep.runs.rows import Rows, rows_of, rules_of
 from sweep.runs.search import answer_rows, run_search
 from sweep.study import Study, load_study
@@ -78,6 +80,21 @@ def pairs_of(
             value = float(swept[name].quantile(rng.uniform(0.2, 0.95) if end == "min" else rng.uniform(0.05, 0.8)))
             drawn.append((goal, name, Bound(**{end: value})))
     return drawn
+
+
+def test_a_verdict_is_the_worst_of_all_scenarios_and_misses_in_units_of_the_quantity(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    columns = [{"csd": np.array([5.0, 9.0]), "light": np.array([90.0, 70.0])}]
+    columns.append({"csd": np.array([7.0, 8.0]), "light": np.array([60.0, 80.0])})
+    rules = SimpleNamespace(constraints={"light": Bound(min=80)}, objective=SimpleNamespace(column="csd"))
+    monkeypatch.setattr(Reading, "columns", lambda *_: iter(columns))
+    reading = object.__new__(Reading)
+    object.__setattr__(reading, "rules", rules)
+    first, second = verdicts(reading, [np.zeros(1), np.ones(1)])
+    assert (first.objective, second.objective) == (5.0, 8.0)
+    assert (first.violation, second.violation) == (0.25, 0.125)
+    assert (first.missed, second.missed) == ({"light": 20.0}, {"light": 10.0})
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from sweep.base.errors import StudyError
 from sweep.results.identity import fingerprint
 from sweep.study import load_study
 
+from ..conftest import STUDIES
 from ..curve_texts import WAVE, bell, csv
 from ..whole_study import WHOLE
 
@@ -79,6 +81,17 @@ def test_every_number_of_a_study_is_in_its_fingerprint(tmp_path: Path, group: in
     assert seen > 60 / _GROUPS
     for text in UNCHANGED:
         assert fingerprint(load_study(written(tmp_path, with_leaf(WHOLE, text, "else")))) == first
+
+
+def test_curves_and_lights_of_the_package_are_in_the_fingerprint() -> None:
+    study = load_study(STUDIES / "paper.yaml")
+    qe = {name: 1.001 * curve for name, curve in study.sensor.qe.items()}
+    photons = 1.001 * study.lights.photons
+    for changed in (
+        replace(study, sensor=replace(study.sensor, qe=qe)),
+        replace(study, lights=replace(study.lights, photons=photons)),
+    ):
+        assert fingerprint(changed) != fingerprint(study)
 
 
 CODE = "FILES = ['shift.csv']\ntry:\n    from helpers import own\nexcept ImportError:\n    own = None\n\n\ndef apart(readings):\n    return readings.of('yellow')[:, :, 0] - readings.of('red')[:, :1, 0]\n\napart.unit, apart.label = 'DN', 'gap'\n"
