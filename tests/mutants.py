@@ -169,7 +169,12 @@ MUTANTS = (
         "curve[self.source] + self.constant",
         "search/test_produced_limit.py",
     ),
-    Mutant("search/sides", "reach = min(part.cap, program.top)", "reach = max(part.cap, program.top)", LIMIT),
+    Mutant(
+        "search/sides",
+        "reach = min(part.cap, program.top)",
+        "reach = max(part.cap, program.top)",
+        "search/test_limit_sides.py",
+    ),
     Mutant("search/trade_off", "check_bound(best.objective, limit.proven, where)", "pass", SEARCH),
     Mutant("search/problem", "key=lambda e: e.objective", "key=lambda e: -e.objective", SEARCH),
     Mutant(
@@ -187,13 +192,13 @@ MUTANTS = (
     Mutant("runs/rows", "[job.scenario, job.space, job.start, job.stop]", "[job.space, job.start, job.stop]", DAMAGE),
     Mutant("runs/kept", "answer {self._round}, {at}", "answer {at}", "search/test_search.py run/test_runner.py"),
     Mutant("runs/handovers", "capture.light * capture.qe_factor", "capture.qe_factor", "run/test_handovers.py"),
-    Mutant("runs/uncertainty", "weights * curve + rest", "weights + rest", "run/test_sensors.py"),
+    Mutant("runs/uncertainty", "weights * curve + rest", "weights + rest", "run/test_uncertain_search.py"),
     Mutant("runs/check", "stored == exact or (math", "True or (math", "cli/test_audit.py run/test_runner.py"),
     Mutant("results/identity", '"files": dict(study.digests)', '"files": {}', IDENTITY),
     Mutant("results/identity", '"lights": lights.hexdigest()', '"lights": ""', IDENTITY),
     Mutant("results/identity", '"curves": curves.hexdigest()', '"curves": ""', IDENTITY),
     Mutant("results/manifest", "digest_of(path) != self.files[name]", "False", DAMAGE),
-    Mutant("results/manifest", 'self.fingerprint == str(facts["fingerprint"])', "True", DAMAGE),
+    Mutant("results/manifest", 'self.fingerprint == str(facts["fingerprint"])', "True", "run/test_faults.py"),
     Mutant("designs/bands", "edges[:, :, 0] - edges[:, :, 1]", "edges[:, :, 1] - edges[:, :, 0]"),
 )
 """Faults of sign, factor, axis, argument, clip, unit and key."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,9 @@ from sweep.designs.tolerance import NONE
 from sweep.metrics.drawn import draws_of
 from sweep.metrics.drawn_sensors import RandomSensors
 from sweep.metrics.members import population_model
+from sweep.metrics.smooth import smooth_csd
 from sweep.results.output import read_output
+from sweep.runs.uncertainty import _on_sensors
 from sweep.search.gradients import Model
 from sweep.search.problem import Problem, SearchRun
 from sweep.search.solver import search_from, smooth_objective
@@ -76,6 +79,18 @@ def test_a_yield_of_random_sensors_is_that_of_own_draws(tmp_path: Path) -> None:
     shown = read_output(tmp_path / "out").table["yield_csd_yellow_red"].iloc[0]
     assert shown == judged["dn"] != found  # pages say what other draws have
     assert judged["dn"] == pytest.approx(np.quantile(own, 0.1), abs=2 * (judged["dn_high"] - judged["dn_low"]))
+
+
+def test_a_filter_before_known_curves_is_that_filter(tmp_path: Path) -> None:
+    problem = problem_of(load(tmp_path, TEXT))
+    uncertain = problem.setup.camera.uncertain
+    assert uncertain is not None
+    known = CurveErrors(draws=100, gain=0.0, shift_nm=0.0, noise=0.0)
+    setup = problem.setup.with_camera(uncertain=replace(uncertain, errors=known))
+    curves = problem.family.curves(X[None])
+    csds, light, _ = _on_sensors(setup, curves[0], 1)
+    assert csds[PAIR] == pytest.approx(np.full(100, smooth_csd(setup, curves, PAIR)[0]), rel=1e-12)
+    assert np.ptp(light) < 1e-12
 
 
 @pytest.mark.parametrize("more", ["", LAMPS, "pixel: {crosstalk: 0.05, offset_dn: 64}\n" + LAMPS])

@@ -9,8 +9,9 @@ import pytest
 
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
+from sweep.search.filter_program import FilterProgram
 from sweep.search.problem import Problem
-from sweep.search.sides import _NEAR
+from sweep.search.sides import _NEAR, Proof, SideRegion
 from sweep.search.upper_bound import upper_bound_of
 from sweep.study import load_study
 
@@ -30,6 +31,11 @@ def test_the_limit_is_that_of_a_milp(coarse: Problem, seed: int) -> None:
     limit = limit_checked_by_milp(problem)
     if seed % 2 == 0:  # the other channels tell nothing apart, so the MILP's margin is what is left to the limit
         assert milp_limit(problem, limit.proven) == pytest.approx(limit.proven, abs=1e-3)
+
+
+def test_a_part_proves_no_more_than_its_own_cap(coarse: Problem) -> None:
+    proof = Proof(1.0, None, 9.0, 0, (SideRegion(5.0), SideRegion(4.0)))
+    assert proof.proven_at(FilterProgram(random_problem(coarse, 0)), 0.9) == 5.0
 
 
 @pytest.mark.parametrize("seed", [0, 1, 3])

@@ -15,7 +15,7 @@ from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
 from sweep.search.perturbed import all_ways, perturbed_filters
 from sweep.search.problem import starting_points
-from sweep.search.upper_bound import UpperBound, reason_without_bound, upper_bound_of
+from sweep.search.upper_bound import UpperBound, _relaxed, reason_without_bound, upper_bound_of
 
 from .problems import PROBLEM, STUDY, YELLOW_RED
 
@@ -38,6 +38,12 @@ def test_a_bound_on_the_designed_sensitivity_does_not_hold_for_perturbed_filters
     moved = replace(MOVED, setup=setup, constraints={"sensitivity": Bound(max=0.9)})
     assert reason_without_bound(moved) == "the modified channel could set the exposure"
     assert reason_without_bound(replace(moved, objective=Objective(minimum={"csd_yellow_red": 1.0}))) is None
+
+
+def test_the_stricter_of_two_bounds_on_one_quantity_stays() -> None:
+    constraints = {"chromatic_csd_yellow_red": Bound(min=90.0), "worst_chromatic_csd_yellow_red": Bound(min=70.0)}
+    asked = replace(MOVED, constraints=constraints)
+    assert _relaxed(asked)[0].constraints == {"chromatic_csd_yellow_red": Bound(min=90.0)}
 
 
 def test_a_way_is_the_family_as_production_has_it() -> None:

@@ -10,6 +10,7 @@ import pytest
 from sweep.designs.tolerance import NONE, Tolerance
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
+from sweep.metrics.smooth import Rows
 from sweep.search.problem import Problem, starting_points
 
 from .problems import PROBLEM, best_of, csd_of, problem_of, rows_at
@@ -30,6 +31,12 @@ OBJECTIVES = (
     Objective(minimum={"worst_csd_yellow_red": 1.0, "csd_orange_red": 3.0, "sensitivity": 200.0}),
     Objective(sum={"worst_csd_yellow_red": 0.5, "csd_green_red": 0.1, "cfa_sensitivity": 100.0}),
 )
+
+
+def test_roots_of_rows_have_half_the_slope_over_the_root() -> None:
+    rows = Rows(np.array([9.0, 0.0]), np.array([[12.0, -6.0], [1.0, 1.0]])).roots()
+    assert rows.values.tolist() == [3.0, 0.0]
+    assert rows.by_u.tolist() == [[2.0, -1.0], [0.0, 0.0]]
 
 
 def check_derivatives(problem: Problem, u: np.ndarray, parameters: range) -> None:
