@@ -62,10 +62,10 @@ def column_rounding(name: str, values: np.ndarray, setup: Setup, magnitude_dn: f
     distance = rounding_of_distance(terms, magnitude_dn, len(setup.camera.mosaic.channels))
     if "csd" in name:
         return np.full(np.shape(values), distance)
-    if name.startswith(("cnr", "dprime")):  # a distance in units of its noise, which is rounded, too
+    if name.startswith("dprime"):  # a distance in units of its noise, which is rounded, too
         return np.asarray(distance / _LEAST_NOISE_DN + gamma(terms) * np.abs(values))
     if "error" in name:
-        # Of Q(d'/2) and exp(-d'^2/8): the slope of their logarithms in d' is below 5 where they are above 1e-18.
+        # Of Q(d'/2): the slope of its logarithm in d' is below 5 where it is above 1e-18.
         return np.asarray((5 * distance / _LEAST_NOISE_DN + gamma(terms)) * np.abs(values))
     if name == "exposure_s":
         return np.asarray(gamma(terms) * np.abs(values))

@@ -265,8 +265,8 @@ class SceneModel:
         for view in self.own_views():
             read = [view.readout.with_noise(e) for e in self._blocks(view, curves, scales, exposure_s)]
             parts.append([np.concatenate(values) for values in zip(*read, strict=True)])
-        mean, variance, gaussian, reach = (np.concatenate(values, axis=1) for values in zip(*parts, strict=True))
-        return NoisyReadout(mean, variance, gaussian, reach, exposure_s)
+        mean, variance = (np.concatenate(values, axis=1) for values in zip(*parts, strict=True))
+        return NoisyReadout(mean, variance, exposure_s)
 
     def _blocks(
         self, view: View, curves: DesignCurves, scales: Float[Array, "... designs moments"], exposure_s: PerDesign

@@ -9,65 +9,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.types import Array, Bool, BoolArray, DesignCases, DesignPixels, Float, IndexArray, Int, PerDesign, SameShape
+from ..base.types import Array, DesignCases, DesignPixels, Float, IndexArray, Int, PerDesign, SameShape
 from .noise import merge, table
 from .noise.pixel_curve import PixelCurve, groups_of, pixel_curve, same_electrons
-from .noise.rounding import DITHERED_DN, MANY_STEPS, rounded
+from .noise.rounding import rounded
 from .pixel import Pixel, unquantized
 from .response import PixelResponse
 from .setup import Setup
 
 _CERTAIN_DN2 = 1e-9
-_FEW = 16
-"""Values from which on a compiled pass saves more time than it takes to load."""
 
 
 @dataclass(frozen=True)
 class NoisyReadout:
     """Readout with noise.
 
-    `mean`, `variance`: mean, DN, and variance, DN^2, of each channel; `gaussian`: True if the noise may be taken as
-    Gaussian: no pixel is cut by the full well or an end of the ADC, and read noise dithers each pixel (0.7 DN) or the
-    deviation is at least 4 steps of the pixel that weighs most. In random pixels and pairs the error of Gaussians was
-    then never less than 1 / 1.2 of the exact one, down to 1e-12 (`tests/metrics/test_confusion.py`): evidence, not a
-    proof.
+    `mean`, `variance`: mean, DN, and variance, DN^2, of each channel.
     """
 
     mean: DesignCases
     variance: DesignCases
-    gaussian: Bool[BoolArray, "designs cases signals channels"]
-    reach_dn: DesignCases
     exposure_s: PerDesign
-
-
-def is_cut(
-    electrons: Float[Array, "captures designs signals pixels"], pixel: Pixel
-) -> Float[Array, "captures designs signals pixels"]:
-    """Return 1 where the full well or an end of the ADC cuts a pixel's noise, else 0."""
-    low, high = table.unclipped_e(pixel)
-    return ((electrons < low) | (electrons > high)).astype(float)
-
-
-def is_gaussian(
-    variance: DesignCases,
-    heaviest: Float[Array, "cases 1 channels"],
-    cut: Bool[BoolArray, "designs cases signals channels"],
-    pixel: Pixel,
-) -> Bool[BoolArray, "designs cases signals channels"]:
-    """Return whether the noise of a channel may be taken as Gaussian; see `NoisyReadout`.
-
-    `variance`: of the channel, DN^2; `heaviest`: largest weight of a pixel in it; `cut`: True where one of its pixels
-    is cut.
-    """
-    dithered = pixel.dn_per_e * pixel.read_noise_e >= DITHERED_DN
-    return np.asarray(~cut & (dithered | (variance >= MANY_STEPS * heaviest**2)), dtype=bool)
-
-
-def reach_dn(electrons: Float[Array, "*batch pixels"], pixel: Pixel) -> Float[Array, "*batch 1"]:
-    """Return the largest distance of a pixel's number from its mean with a probability above 1e-15."""
-    reach_e = 9 * (np.sqrt(electrons) + pixel.prnu * electrons + pixel.read_noise_e) + 27
-    reach = np.minimum(pixel.dn_per_e * reach_e + 1, float(pixel.full_scale_dn))
-    return np.asarray(reach.max(axis=-1, keepdims=True), dtype=float)
 
 
 def capture_light(setup: Setup, response: PixelResponse) -> Float[Array, "captures pixels"]:
@@ -191,22 +153,20 @@ class Readout:
 
     def with_noise(
         self, electrons: Float[Array, "*captures designs cases signals pixels"]
-    ) -> tuple[DesignCases, DesignCases, Bool[BoolArray, "designs cases signals channels"], DesignCases]:
-        """Read out a block with noise.
+    ) -> tuple[DesignCases, DesignCases]:
+        """Return mean and variance of a block with noise.
 
         `electrons`: expected electrons; elements are pixels. Of an HDR pixel those of each exposure, on the first axis.
         """
         if self.pixel.captures:
             mean, variance = self._merged_moments(electrons)
-            spread = self.spread(variance)
-            return (self.folded(mean), spread, *self._shape_of_merged(electrons, spread))
+            return self.folded(mean), self.spread(variance)
         dn, variance_dn = self.transfer(electrons), self.variance_dn(electrons)
         # A digital number that is the same in all but one of a billion readouts: what is left of its noise is
         # rounding of the arithmetic, by which two signals would seem separated with certainty.
         certain = variance_dn < _CERTAIN_DN2
         dn, variance_dn = np.where(certain, np.rint(dn), dn), np.where(certain, 0.0, variance_dn)
-        mean, variance = self.folded(dn), self.spread(variance_dn)
-        return (mean, variance, *self._shape_of_noise(electrons, variance))
+        return self.folded(dn), self.spread(variance_dn)
 
     def of_pixels(self, values: Float[Array, " ..."]) -> Float[Array, " ..."]:
         """Return values of the pixels of a tile, row by row, from those of channels that fill the field."""
@@ -214,43 +174,7 @@ class Readout:
             return values[..., self.setup.camera.mosaic.indices.ravel()]
         return values
 
-    @property
-    def few_pixels(self) -> tuple[Int[IndexArray, " _pixels"], ...] | None:
-        """Pixels whose mean is each channel; None for a target, or if they are many."""
-        setup = self.setup
-        if setup.scene.target is not None or setup.camera.mosaic.counts.max() > _FEW:
-            return None
-        channels = setup.camera.mosaic.indices.ravel()
-        return tuple(np.flatnonzero(channels == at) for at in range(len(setup.camera.mosaic.channels)))
-
     def _weighed(self, values: DesignPixels, weights: Float[Array, "_positions pixels channels"]) -> DesignCases:
         """Sum over the elements with weights."""
         repeats = values.shape[1] // self.n_cases
         return np.asarray(values @ np.repeat(weights, repeats, axis=0))
-
-    def _shape_of_noise(
-        self,
-        electrons: Float[Array, "captures designs signals pixels"],
-        variance: Float[Array, "captures designs signals _channels"],
-    ) -> tuple[
-        Bool[BoolArray, "captures designs signals _channels"], Float[Array, "captures designs signals _channels"]
-    ]:
-        """Return `gaussian` and `reach_dn` of `NoisyReadout`."""
-        heaviest = self._heaviest(variance)
-        cut = self._weighed(is_cut(electrons, self.pixel), (self.weights > 0).astype(float)) > 0
-        return is_gaussian(variance, heaviest, cut, self.pixel), reach_dn(electrons, self.pixel) * heaviest
-
-    def _shape_of_merged(
-        self, electrons: Float[Array, "captures designs cases signals pixels"], variance: DesignCases
-    ) -> tuple[Bool[BoolArray, "designs cases signals channels"], DesignCases]:
-        """Return `gaussian` and `reach_dn` of `NoisyReadout` for HDR pixels."""
-        light = self.capture_light_of(electrons)
-        gaussian, reach_dn = merge.shape_of_noise(electrons, light, self.pixel)
-        others = self._weighed((~gaussian).astype(float), (self.weights > 0).astype(float))
-        return others == 0, reach_dn.max(axis=-1, keepdims=True) * self._heaviest(variance)
-
-    def _heaviest(self, variance: DesignPixels) -> Float[Array, "cases 1 channels"]:
-        """Return the largest weight of a pixel in each channel, broadcast to the cases."""
-        repeats = variance.shape[1] // self.n_cases
-        heaviest = self.weights.max(axis=1) if self.setup.scene.target else 1 / self.setup.camera.mosaic.counts[None]
-        return np.repeat(np.broadcast_to(heaviest, (self.n_cases, variance.shape[-1])), repeats, axis=0)[:, None]

@@ -85,21 +85,19 @@ class Batch:
 
     `states`: signal types that noise may confuse; `pairs`: those whose chromatic distances are wanted; `family`,
     `points`: of the designs, if they are of one; `noisy`: columns under noise are wanted; `any_brightness`: of states
-    of any brightness, too; `bounds`: bounds on errors, too; `columns`: those that are known; `by_case`: those of each
-    case; `walks`: along the brightness of the lamps of designs.
+    of any brightness, too; `columns`: those that are known; `by_case`: those of each case; `walks`: along the
+    brightness of the lamps of designs.
     """
 
     model: SceneModel
     block: Block
     states: Sequence[str] = ()
     pairs: Sequence[Pair] = ()
-    probabilities: bool = False
     family: Family | None = None
     points: DesignParameters | None = None
     images: SeededVision | None = None
     noisy: bool = False
     any_brightness: bool = False
-    bounds: bool = True
     columns: Columns = field(default_factory=dict)
     by_case: dict[str, Float[Array, "cases designs"]] = field(default_factory=dict)
     walks: dict[tuple[int, DistanceKind], dict[Pair, Walk]] = field(default_factory=dict)
@@ -192,9 +190,9 @@ class Batch:
         return distances
 
     def of(self, model: SceneModel, design: int) -> Batch:
-        """Return one of the designs in another model of the scene, without bounds on errors."""
+        """Return one of the designs in another model of the scene."""
         block = CurveBlock(self.curves_of(design))
-        return Batch(model, block, self.states, self.pairs, noisy=self.noisy, bounds=False)
+        return Batch(model, block, self.states, self.pairs, noisy=self.noisy)
 
     @property
     def finite(self) -> list[int]:

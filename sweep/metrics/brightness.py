@@ -1,8 +1,8 @@
 """Distance and errors of two lamps of unknown brightness: from the reading of one to the brightness curve of the other.
 
 R(a) is the reading of a lamp of brightness a, relative to that of the scene. The chromatic distance of two lamps is the
-smaller of min |R1(1) - R2(a)| and min |R1(a) - R2(1)|, in DN or in units of the noise of both readings (d'); the error
-is that of two Gaussians at the smallest d'. Curves are taken at nodes, and refined where they come near.
+smaller of min |R1(1) - R2(a)| and min |R1(a) - R2(1)|, in DN or in units of the noise of both readings (d'). Curves are
+taken at nodes, and refined where they come near.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 
 from ..base.types import Array, Bool, BoolArray, DesignCurves, Float, IndexArray, Int
 from ..camera.brightness import LampReadings
-from ..camera.noise.gaussian import share_below
 from ..camera.setup import Setup
+from .discrimination import balance_of
 
 LEAST_DN2 = 1e-9
 """Least variance in units of which a distance is taken, DN^2."""
@@ -167,12 +167,15 @@ class BrightnessCurves:
 
         def slope(factors: Float[Array, " nearest"]) -> Float[Array, " nearest"]:
             there, spread, by_mean, by_spread = self.lamps.along(found.curve, factors)
-            if not noise:
-                return np.asarray((-(mean - there) * by_mean).sum(axis=1))
-            total = np.maximum((variance + spread) / 2, self._least_dn2)
-            moving = by_spread * (total > self._least_dn2)
             difference = mean - there
-            return np.asarray((-difference * by_mean / total - difference**2 * moving / (4 * total**2)).sum(axis=1))
+            if not noise:
+                return np.asarray((-difference * by_mean).sum(axis=1))
+            moving = by_spread * (spread > self._least_dn2)
+            ours, theirs = np.maximum(variance, self._least_dn2), np.maximum(spread, self._least_dn2)
+            w = balance_of(difference, ours, theirs)[:, None]
+            weight = 4 * w / ((1 + w) * (ours + w * theirs))
+            changes = difference**2 * moving * weight**2 * (1 + w) / 8
+            return np.asarray((-difference * by_mean * weight - changes).sum(axis=1))
 
         (low, high), (darkest, brightest) = found.bracket.T, (self._nodes[found.curve, end] for end in (0, -1))
         low, high = np.maximum(2 * low - high, darkest), np.minimum(2 * high - low, brightest)
@@ -289,8 +292,3 @@ def _distinct(parts: Sequence[Nearest]) -> Nearest:
     np.minimum.at(low, which.ravel(), every.bracket[:, 0])
     np.maximum.at(high, which.ravel(), every.bracket[:, 1])
     return replace(every.subset(first), bracket=np.stack([low, high], axis=1))
-
-
-def error_of(dprime: Float[Array, " *batch"] | float) -> Float[Array, " ..."]:
-    """Return the error of two Gaussians at a distance in units of their noise, Q(d' / 2)."""
-    return share_below(-dprime / 2)

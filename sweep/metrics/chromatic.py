@@ -21,6 +21,7 @@ from ..camera.noise.pixel_curve import STEPS_DN2
 from ..spectra.lights import Pair, class_pairs
 from .brightness import BrightnessCurves
 from .complex_step import Smooth
+from .discrimination import dprime
 from .separation import MANY, MOST_CHANNELS, packed_response, pair_blocks, pair_order
 from .smooth import Rows, SmoothDesign
 
@@ -175,13 +176,14 @@ def _nearest_rows(
     of_curve = lamps.moments(near.curve, factor)
 
     (mean, variance, by_mean, by_variance), (mean_2, variance_2, by_mean_2, by_variance_2) = of_reading, of_curve
-    spread = variance + variance_2
-    moves = spread > 2 * STEPS_DN2
-    spread, by_spread = np.maximum(spread, 2 * STEPS_DN2), np.where(moves, by_variance + by_variance_2, 0.0)
+    apart = mean - mean_2, by_mean - by_mean_2
     if not noise:
-        spread, by_spread = np.full_like(spread, 2.0), np.zeros_like(by_spread)
-    apart = (mean - mean_2, by_mean - by_mean_2), (spread, by_spread)
-    return Rows.of(lambda difference, spread: (2 * difference**2 / spread).sum(axis=-1), *apart)
+        return Rows.of(lambda difference: (difference**2).sum(axis=-1), apart)
+    spreads = [
+        (np.maximum(values, STEPS_DN2), np.where(values > STEPS_DN2, slopes, 0.0))
+        for values, slopes in ((variance, by_variance), (variance_2, by_variance_2))
+    ]
+    return Rows.of(lambda *of: dprime(*of) ** 2, apart, *spreads)
 
 
 def _closed_rows(design: SmoothDesign, pairs: Sequence[Pair], factors: PerChannel | float) -> Rows:

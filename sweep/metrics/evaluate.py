@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.types import DesignCurves, DesignParameters
 from ..camera.model import SceneModel
+from ..camera.noise.errors import few_pixels
 from ..camera.setup import Setup
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
@@ -19,7 +20,7 @@ from .batch import Batch, DistanceKind
 from .brightness import Walk
 from .columns.chromatic import CHROMATIC_CSD, CHROMATIC_DPRIME, CHROMATIC_ERROR
 from .columns.color_separation import ColorSeparation
-from .columns.confusion import CNR, D_PRIME, ERROR, STATE_ERROR
+from .columns.confusion import D_PRIME, ERROR, STATE_ERROR
 from .columns.exposure import EXPOSURE
 from .columns.pixel_separation import CHROMATIC_PIXEL_CSD
 from .columns.user import UserColumns
@@ -44,7 +45,6 @@ def evaluate(
     designs: DesignCurves | Block,
     states: Sequence[str] = (),
     *,
-    probabilities: bool = False,
     user_metrics: Sequence[UserMetric] = (),
     metrics: Collection[Metric] = METRICS,
     chromatic: Sequence[Pair] | None = None,
@@ -67,15 +67,11 @@ def evaluate(
     pairs = class_pairs(model.setup.lights.classes) if chromatic is None else chromatic
     needs = {metric.needs for metric in metrics} if states else set()
     wanted = "noise" in needs, "any brightness" in needs
-    batch = Batch(model, block, states, tuple(pairs), probabilities, family, points, images, *wanted, refined is None)
+    batch = Batch(model, block, states, tuple(pairs), family, points, images, *wanted)
     others = [metric for metric in metrics if not isinstance(metric, ColorSeparation | UserColumns)]
     of_readings = [_CSD, *others, *map(UserColumns, user_metrics)]
     requested = RequestedQuantities(
-        model.setup.lights.classes,
-        tuple(states),
-        any_place=True,
-        probabilities=probabilities,
-        user_metrics=tuple(user_metrics),
+        model.setup.lights.classes, tuple(states), any_place=True, user_metrics=tuple(user_metrics)
     )
     batch.by_case = _by_case(batch, of_readings)
     readings = tuple(batch.by_case)
@@ -117,7 +113,7 @@ def _of_readings(batch: Batch, names: Sequence[str], metrics: Sequence[Metric], 
 
 
 def _under_noise(batch: Batch, metrics: Sequence[Metric], wanted: Collection[str]) -> list[Sought]:
-    """Return what is sought of each design under noise: contrasts and errors, not the bounds on them."""
+    """Return what is sought of each design under noise."""
     noisy = [metric for metric in metrics if metric.needs == "noise"] if batch.noisy else []
 
     def read(design: int, model: SceneModel) -> Columns:
@@ -125,7 +121,7 @@ def _under_noise(batch: Batch, metrics: Sequence[Metric], wanted: Collection[str
         return {name: values for metric in noisy for name, values in metric.of_cases(at).items()}
 
     pairs = class_pairs(list(batch.states))
-    known = (*(pair_name(metric, pair) for metric in (CNR, D_PRIME, ERROR) for pair in pairs), STATE_ERROR)
+    known = (*(pair_name(metric, pair) for metric in (D_PRIME, ERROR) for pair in pairs), STATE_ERROR)
     names = tuple(name for name in known if noisy and name in wanted)
     return [Sought(design, batch.exposure_s[design], names, partial(read, design)) for design in batch.finite if names]
 
@@ -151,9 +147,10 @@ def evaluate_some(
 ) -> dict[str, float]:
     """Return quantities of one design, by no more than they need."""
     metrics, names = {quantity.metric for quantity in quantities}, {quantity.name for quantity in quantities}
+    camera = model.setup.camera
     if CHROMATIC_ERROR in metrics:
         names |= {name.replace(CHROMATIC_ERROR, CHROMATIC_DPRIME) for name in names}
-        if model.readout.few_pixels is not None:  # exact sums may be larger
+        if few_pixels(model.setup.scene, camera.pixel, camera.mosaic) is not None:  # exact sums may be larger
             metrics.add(ERROR)
     requested = RequestedQuantities(model.setup.lights.classes, tuple(states), flicker=True)
     owners = [metric for metric in METRICS if metrics & {of.metric for of in metric.quantities(requested)}]

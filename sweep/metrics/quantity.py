@@ -225,9 +225,8 @@ class Quantity(Column):
 class RequestedQuantities:
     """Quantities requested by a study.
 
-    `wanted_yield`: share of random lamps and cameras; 0: none; `probabilities`, `vision`, `flicker`: contrast detection
-    probability; benchmark of vision; pulsed lamps in an HDR pixel; `brightest`: curve whose light is 1, if there is no
-    clear pixel.
+    `wanted_yield`: share of random lamps and cameras; 0: none; `vision`: benchmark of vision; `flicker`: pulsed lamps
+    in an HDR pixel; `brightest`: curve whose light is 1, if there is no clear pixel.
     """
 
     classes: tuple[str, ...]
@@ -237,7 +236,6 @@ class RequestedQuantities:
     population: bool = False
     wanted_yield: float = 0.0
     tasks: tuple[TaskColumns, ...] = ()
-    probabilities: bool = False
     vision: bool = False
     flicker: bool = False
     user_metrics: tuple[UserMetric, ...] = ()

@@ -15,7 +15,7 @@ from ..base.errors import UpperBoundExceededError, ValidationIssue
 from ..base.types import Array, Float
 from ..metrics.columns.chromatic import CHROMATIC_CSD, CHROMATIC_ERROR
 from ..metrics.columns.color_separation import CSD
-from ..metrics.columns.confusion import STATE_ERROR, STATE_ERROR_BOUND
+from ..metrics.columns.confusion import STATE_ERROR
 from ..metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD, PIXEL_CSD
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import DN
@@ -27,7 +27,7 @@ from .numbers import ERROR, NARROW, SHARE, Span, amount, digits, joined, ranges
 from .tables import PROVEN, Axis, Column, Marks
 
 LIGHT = CFA_SENSITIVITY
-_ERRORS = (CHROMATIC_ERROR, STATE_ERROR, STATE_ERROR_BOUND)
+_ERRORS = (CHROMATIC_ERROR, STATE_ERROR)
 AXES = {
     "distance_m": ("distance", "m"),
     "exposure_s": ("exposure time", "s"),

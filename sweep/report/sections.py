@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ..base.types import Array, Float
+from ..camera.noise.errors import few_pixels
 from ..camera.scene import Scene
 from ..results.facts import Origin
 from ..results.manifest import Manifest
@@ -417,6 +418,10 @@ def conditions(run: Run) -> Pairs:
     )
     parts.append("with noise" if any(scene.noise for scene in scenes) else "no noise")
     found.append(("scene", ", ".join(parts)))
+    if run.study.recognition is not None:
+        mosaics = [run.output.mosaic(cfa) for cfa in run.study.cfas]
+        few = [few_pixels(*both, mosaic) for both in zip(scenes, pixels, strict=True) for mosaic in mosaics]
+        found.append(("errors", "Q(d'/2)" if None in few else "exact sums; of any brightness Q(d'/2)"))
     limits = []
     for name, bound in run.output.constraints.items():
         column = run.output.columns.get(name)

@@ -100,7 +100,7 @@ def columns_table() -> list[str]:
     types = ("<a>", "<b>")
     rows = [_row(names, "", meaning) for names, meaning in _KEYS.items()]
     tasks = tuple(TaskColumns("<task>", metric, ("<light>",)) for metric in get_args(TaskMetric))
-    requested = RequestedQuantities(types, types, any_place=True, probabilities=True, tasks=tasks, vision=True)
+    requested = RequestedQuantities(types, types, any_place=True, tasks=tasks, vision=True)
     for quantity in listed(requested):
         more = _WITHOUT_CLEAR if quantity.name == CFA_SENSITIVITY else ""
         rows.append(_row((quantity.name,), quantity.unit, quantity.meaning + more))

@@ -141,7 +141,6 @@ def columns_of_points(
         model,
         designs,
         requested.states,
-        probabilities=requested.probabilities,
         user_metrics=wanted.user_metrics,
         metrics=wanted.metrics,
         chromatic=wanted.chromatic,

@@ -125,7 +125,9 @@ class FilterProgram:
             differences = factors[channel] * (gain[:, first, None] - gain[:, None, second])
             squares = (np.delete(factors, channel) * (fixed[:, first, None] - fixed[:, None, second])) ** 2
             if noise is not None and self.problem.quantities[name].distance_kind == "noise":
-                own_noise, others = ((variance[:, first, None] + variance[:, None, second]) / 2 for variance in noise)
+                # No l leaves a channel less noise than its own best one, the mean of both deviations.
+                deviations = map(np.sqrt, noise)
+                own_noise, others = (((of[:, first, None] + of[:, None, second]) / 2) ** 2 for of in deviations)
                 differences, squares = differences / np.sqrt(own_noise)[..., None], squares / others
             others_squared = squares.sum(axis=3).ravel()
             rows = differences.reshape(-1, self.base.size)

@@ -308,12 +308,10 @@ def requested_quantities(
     section: StudySection, lights: Lights, tasks: StudyTasks | None, user_metrics: tuple[UserMetric, ...]
 ) -> RequestedQuantities:
     """Return the quantities that a study computes, as far as its lights and tasks determine them."""
-    recognition = section.recognition
     return RequestedQuantities(
         lights.classes,
         _states(section, lights),
         edge_shift=bool(section.production.tolerance),
-        probabilities=recognition is not None and recognition.probabilities,
         population=section.population is not None,
         wanted_yield=section.wanted_yield,
         tasks=() if tasks is None else tasks.columns,

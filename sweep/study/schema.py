@@ -190,8 +190,6 @@ class Recognition(Section):
     """Signal types to classify; left out, all of them."""
     error_max: float = Field(default=1e-3, ge=1e-300, lt=0.5)
     """Largest error probability of two states at which a CFA counts as usable."""
-    probabilities: bool = False
-    """Add columns of the contrast transfer accuracy (CTA) of IEEE 2020-2024 (formerly CDP)."""
 
 
 class Levels(Section):

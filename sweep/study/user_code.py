@@ -204,7 +204,7 @@ def check_names(
     widest = replace(
         requested, user_metrics=(), states=requested.classes, any_place=True, edge_shift=True, population=True
     )
-    taken = {*quantities_of(replace(widest, probabilities=True, vision=True)), *RESERVED}
+    taken = {*quantities_of(replace(widest, vision=True)), *RESERVED}
     taken |= {name for space in spaces for name in space.parameters}
     for metric in user_metrics:
         if metric.name in taken:

@@ -168,7 +168,7 @@ def test_errors_are_those_of_all_outcomes(seed: int) -> None:
                 all_values[value] = all_values.get(value, 0.0) + share * chance
     error = sum(min(one.get(v, 0.0), other.get(v, 0.0)) for v in one | other) / 2
     assert sum(one.values()) == pytest.approx(1, abs=1e-9)
-    assert found.error["one", "other"][0] == pytest.approx(error, rel=0.02)
+    assert found["one", "other"][0] == pytest.approx(error, rel=0.02)
 
 
 def test_codes_of_companding_add_their_steps() -> None:
@@ -186,7 +186,7 @@ def test_codes_of_companding_add_their_steps() -> None:
     signals = light[:, None, None, None] * (electrons * np.array([1.0, 1.05]))[None, None, :, None]
     members = {"one": np.array([0]), "other": np.array([1])}
     without, with_codes = (
-        confusion.errors(signals, [np.array([0])], one, members, light[:, None]).error["one", "other"][0]
+        confusion.errors(signals, [np.array([0])], one, members, light[:, None])["one", "other"][0]
         for one in (linear, pixel)
     )
     assert with_codes > 0.97 * without  # whose own bins cost up to 2 %

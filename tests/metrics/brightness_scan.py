@@ -8,15 +8,20 @@ import numpy as np
 
 from sweep.camera.brightness import LampReadings
 
+from ..margin import near_squared_dprime
+
 _FACTORS = np.concatenate([[0.0], np.geomspace(1e-6, 1e7, 6000)])
 _BASINS, _FINER = 24, 101
 LEAST_DN2 = 1e-9
 
 
-def squared(mean: np.ndarray, spread: np.ndarray, reading: np.ndarray, noise: np.ndarray | None) -> np.ndarray:
+def squared(
+    mean: np.ndarray, spread: np.ndarray, reading: np.ndarray, noise: np.ndarray | None, most: float = np.inf
+) -> np.ndarray:
     """Squared distances of one reading, and its variance, from readings of another lamp, [..., channels]."""
-    weight = 1.0 if noise is None else 1 / np.maximum((spread + noise) / 2, LEAST_DN2)
-    return ((mean - reading) ** 2 * weight).sum(axis=-1)
+    if noise is None:
+        return ((mean - reading) ** 2).sum(axis=-1)
+    return near_squared_dprime(mean - reading, np.maximum(spread, LEAST_DN2), np.maximum(noise, LEAST_DN2), most)
 
 
 def nearest(
@@ -26,14 +31,15 @@ def nearest(
 
     Returns the distance, the lamp that is read, the other one and its brightness.
     """
-    found = []
+    found, upper = list[tuple[float, int, int, int]](), np.inf
     for own, other in ((first, second), (second, first)):
         means, spreads = (values[:, 0] for values in lamps.moments(own, np.ones((own.size, 1))))
         for curve in other:
             mean, spread = (values[0] for values in lamps.moments(np.array([curve]), _FACTORS[None]))
             for reading, at, variance in zip(own, means, spreads, strict=True):
-                distances = squared(mean, spread, at, variance if noise else None)
+                distances = squared(mean, spread, at, variance if noise else None, upper)
                 best = int(distances.argmin())
+                upper = min(upper, 4 * float(distances[best]))
                 found.append((float(distances[best]), int(reading), int(curve), best))
     least = (np.inf, -1, -1, 0.0)
     for value, reading, curve, best in sorted(found)[:_BASINS]:

@@ -100,8 +100,8 @@ def test_faults(tmp_path: Path, old: str, new: str, said: str) -> None:
 def test_columns_of_noise_must_differ(tmp_path: Path) -> None:
     (tmp_path / "led.csv").write_text("wavelength_nm,x\n400,1\n700,1\n")
     path = tmp_path / "noisy.yaml"
-    lights = "lights: {files: [{file: led.csv, quantity: energy, signals: {bound_a: [x], a: [x], c: [x]}}]}"
+    lights = "lights: {files: [{file: led.csv, quantity: energy, signals: {a: [x], a_b: [x], b_c: [x], c: [x]}}]}"
     states = "recognition: {}\nobjective: csd_a_c\n"
     path.write_text(STUDY.split("recognition:", maxsplit=1)[0].replace("lights: tl16", lights) + states)
-    with pytest.raises(StudyError, match="the pairs a/c and bound_a/c share the column error_bound_a_c"):
+    with pytest.raises(StudyError, match="share the column csd_a_b_c"):
         load_study(path)

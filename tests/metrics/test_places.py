@@ -12,6 +12,7 @@ from sweep.camera.phases import phases_at
 from sweep.metrics.evaluate import evaluate
 
 from ..hard.scenes import DARK, F2, DesignScene, scene, target
+from ..margin import squared_dprime
 
 STATES = ("yellow", "red")
 _DIMMED = np.linspace(0.0, 1.0, 4001)
@@ -38,8 +39,8 @@ def least_of(model: SceneModel, curves: np.ndarray) -> dict[str, float]:
                     scan = np.sqrt(((lit - _DIMMED[:, None] * dimmed) ** 2).sum(axis=1)).min()
                     least["chromatic_csd"] = min(least["chromatic_csd"], float(scan))
                 if read is not None:
-                    spread = (read.variance[0, case, one] + read.variance[0, case, other]) / 2
-                    least["dprime"] = min(least["dprime"], float(np.sqrt((apart**2 / spread).sum())))
+                    squared = squared_dprime(apart, read.variance[0, case, one], read.variance[0, case, other])
+                    least["dprime"] = min(least["dprime"], float(np.sqrt(squared)))
     return least
 
 

@@ -17,7 +17,7 @@ from scipy.spatial.distance import cdist
 
 from sweep.camera.linear import linear_model
 from sweep.camera.setup import Setup
-from sweep.metrics.discrimination import detectability, pairwise_error
+from sweep.metrics.discrimination import detectability, error_of
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.quantity import Quantity, RequestedQuantities
 from sweep.metrics.registry import quantities_of
@@ -124,7 +124,7 @@ def test_separations_are_those_of_the_nearest_pair(name: str, at: int, case: str
         found = {
             "csd": min(cdist(electrons[a], electrons[b]).min() * 4095 / 10_000 for a, b in pairs),
             "dprime": min(detectability(*noisy, a, b)[0] for a, b in pairs),
-            "error": max(pairwise_error(*noisy, a, b)[0] for a, b in pairs),
+            "error": max(error_of(detectability(*noisy, a, b))[0] for a, b in pairs),
         }
         for what, value in found.items():
             assert columns()[f"{name}_{what}{end}"][number] == pytest.approx(value, rel=1e-7, abs=1e-300)

@@ -45,7 +45,7 @@ def test_each_error_without_upper_bound_has_a_reason() -> None:
     problem = problem_in("chart")
     without = [q for q in problem.quantities.values() if q.states and q.goal and not q.has_limit]
     errors = {"error", "state_error", "chromatic_error"}
-    assert {q.metric for q in without} == {"cnr", "chromatic_dprime", *errors}
+    assert {q.metric for q in without} == {"chromatic_dprime", *errors}
     for quantity in without:
         rule = "least" if quantity.direction == "less" else "minimum"
         requested = replace(problem, objective=Objective.model_validate({rule: {quantity.name: 1.0}}))

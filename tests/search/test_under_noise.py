@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,7 +28,6 @@ from sweep.spectra.colorants import modeled_colorants
 from sweep.study import load_study
 
 from ..build import one_line
-from ..conftest import STUDIES
 from ..hard.random_scenes import random_scene
 from ..hard.scenes import FAMILY, GRID, SENSOR
 from .problems import STATES, best_of, noisy_problem
@@ -148,7 +146,7 @@ def test_error_constraints_are_met() -> None:
             "more of dprime_yellow_red is better; allowed: `minimum` or `sum`",
         ),
         ("constraints: {state_error: {max: 0}}", "no such error is computed (got 0.0); allowed: 1e-12 to 1"),
-        ("constraints: {cnr_yellow_red: {max: 2}}", "cnr_yellow_red has no `max`"),
+        ("constraints: {dprime_yellow_red: {max: 2}}", "dprime_yellow_red has no `max`"),
     ],
 )
 def test_invalid_error_constraint_is_one_line(told: str, issue: str, tmp_path: Path) -> None:
@@ -157,12 +155,3 @@ def test_invalid_error_constraint_is_one_line(told: str, issue: str, tmp_path: P
     file.write_text(f"{start}{told}\n")
     with one_line(issue):
         load_study(file)
-
-
-def test_search_refuses_quantities_without_smooth_rows(tmp_path: Path) -> None:
-    text = (STUDIES / "stopband.yaml").read_text().replace("search:", "recognition: {probabilities: true}\nsearch:", 1)
-    path = tmp_path / "asked.yaml"
-    constrained = re.sub(r"^constraints:\n", "constraints:\n  cta_yellow_red: {min: 0.9}\n", text, flags=re.MULTILINE)
-    path.write_text(constrained.replace("level: 0.95}", "level: 0.95}\n    noise: true", 1))
-    with one_line("constraints.cta_yellow_red: the search does not know"):
-        load_study(path)

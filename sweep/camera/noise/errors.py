@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ...base.types import Array, Float, FloatArray, IndexArray, Int, MemberNumbers, PerDesign
-from ...spectra.lights import class_pairs
+from ...spectra.lights import Pair, class_pairs
+from ..mosaic import Mosaic
 from ..pixel import Pixel
+from ..scene import Scene
 from .merged_numbers import merged_numbers
 from .merged_readings import countable
 
 FLOOR = 1e-18
-"""Largest contribution of neglected tails to an error or to its bound."""
+"""Largest contribution of neglected tails to an error."""
 _FAR = 14.0
 """Standard deviations beyond which readings of a pixel are left out."""
 _LEAST_BINS = 1e-4
@@ -30,17 +31,11 @@ _AT_ONCE = 4096
 """Signals of designs whose digital numbers are held at once."""
 _MOST_SUMS = 3e8
 """Additions that a signal's digital numbers may take: a fifth of a second. Sensors of 16 bit and 10^6 e stay below."""
+_MOST_PIXELS, _MOST_MERGED = 16, 4
+"""Pixels of a channel, read once and of merged captures: their bins, of one pixel's noise, tell sums of more less well
+than Q(r) does."""
 _MOST_BINS = 1_000_000
 """Bins of one pixel; those of 51 signals in four channels take 1.6 GiB."""
-
-
-@dataclass(frozen=True)
-class Errors:
-    """Errors of a batch of designs."""
-
-    error: dict[tuple[str, str], PerDesign]
-    bound: dict[tuple[str, str], PerDesign]
-    state_bound: PerDesign
 
 
 def _bins(pixel: Pixel) -> tuple[int, float, int]:
@@ -50,6 +45,15 @@ def _bins(pixel: Pixel) -> tuple[int, float, int]:
     """
     wide = max(1, int(max(pixel.read_noise_e, 1.0) * min(pixel.dn_per_e, pixel.full_scale_dn) / 4))
     return wide, pixel.read_noise_e * pixel.dn_per_e / wide, pixel.full_scale_dn // wide + 1
+
+
+def few_pixels(scene: Scene, pixel: Pixel, mosaic: Mosaic) -> tuple[Int[IndexArray, " _pixels"], ...] | None:
+    """Return the pixels whose mean is each channel; None for a target, and where their sums are too many."""
+    if scene.target is not None or mosaic.counts.max() > (_MOST_MERGED if pixel.captures else _MOST_PIXELS):
+        return None
+    channels = mosaic.indices.ravel()
+    pixels = tuple(np.flatnonzero(channels == at) for at in range(len(mosaic.channels)))
+    return pixels if affordable(pixel, pixels) else None
 
 
 def affordable(pixel: Pixel, channels: Sequence[Int[IndexArray, " _pixels"]]) -> bool:
@@ -104,12 +108,11 @@ def errors(
     pixel: Pixel,
     members: Mapping[str, MemberNumbers],
     light: Float[Array, "captures pixels"] | None = None,
-) -> Errors:
-    """Compute errors and bounds of a batch of designs.
+) -> dict[Pair, PerDesign]:
+    """Compute the errors of a batch of designs.
 
     The error of two signals is that of the maximum likelihood rule, the least of any rule: half the sum of the smaller
-    of both probabilities over all readouts. The bound is the sum of the Bhattacharyya coefficients with signals of
-    other types, for the worst signal.
+    of both probabilities over all readouts.
 
     `electrons`: expected electrons of each pixel; of an HDR pixel those of each exposure, on the first axis; `light`:
     light of the exposures of an HDR pixel relative to that of a pixel of full sensitivity.
@@ -125,8 +128,6 @@ def errors(
     electrons = np.where(unknown[:, None, None], 0.0, np.minimum(electrons, 100 * most_e + 1e5))
     pairs = class_pairs(list(members))
     pair_errors = {pair: np.empty(n_designs) for pair in pairs}
-    bounds = {pair: np.empty(n_designs) for pair in pairs}
-    state = np.empty(n_designs)
     step = _NATS / len(channels)
     for start in range(0, n_designs, max(1, _AT_ONCE // n_signals)):
         block = electrons[..., start : start + max(1, _AT_ONCE // n_signals), :, :]
@@ -140,17 +141,10 @@ def errors(
         for d in range(block.shape[-3]):
             rows = np.ascontiguousarray(all_rows[:, d])
             overlap = kernels.overlaps(*parts, rows)
-            sums = np.zeros(n_signals)
             for pair in pairs:
                 first_signals, second_signals = members[pair[0]], members[pair[1]]
-                overlaps_of_pair = overlap[np.ix_(first_signals, second_signals)]
-                for signals, axis in ((first_signals, 1), (second_signals, 0)):
-                    sums[signals] += overlaps_of_pair.sum(axis=axis)
-                worst = max(overlaps_of_pair.sum(axis=1).max(), overlaps_of_pair.sum(axis=0).max())
-                bounds[pair][start + d] = min(worst + FLOOR, 1.0)
                 error = kernels.largest_error(overlap, first_signals, second_signals, *parts, logs, rows, step)
                 pair_errors[pair][start + d] = min(error + FLOOR, 0.5)
-            state[start + d] = min(sums.max() + FLOOR, 1.0)
-    for values in (*pair_errors.values(), *bounds.values(), state):
+    for values in pair_errors.values():
         values[unknown] = np.nan
-    return Errors(pair_errors, bounds, state)
+    return pair_errors

@@ -20,15 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.types import Array, Bool, BoolArray, Float, FloatArray, PerCapture, SameShape
+from ...base.types import Array, Float, FloatArray, PerCapture, SameShape
 from ..pixel import Pixel, unquantized
 from .moments import DRAWN, LinearRange
-from .rounding import DITHERED_DN, MANY_STEPS, rounded
+from .rounding import rounded
 from .subsets import Subset, SubsetMoments, subset_table, threshold_dn
-from .table import unclipped_e
 
 _PER_DEVIATION = 1.3
-_CERTAIN = 1 - 1e-12
 _CERTAIN_DN2, _ROUNDING = 1e-9, 1e-15
 _HELD = 200_000
 """Values of pixels, of several gains, that are held at once."""
@@ -38,13 +36,11 @@ _HELD = 200_000
 class Merged:
     """Merged values.
 
-    `mean`, `variance`: mean, DN of the first capture, and variance, DN^2; `certain`: True where the same captures are
-    used in all but 1e-12 of the readouts of a pixel of the mean gain.
+    `mean`, `variance`: mean, DN of the first capture, and variance, DN^2.
     """
 
     mean: SameShape
     variance: Float[Array, "*#batch"]
-    certain: Bool[BoolArray, "*#batch"]
 
 
 def limits_dn(pixel: Pixel) -> tuple[int | None, ...]:
@@ -85,7 +81,7 @@ def merged(electrons: PerCapture, light: PerCapture, pixel: Pixel) -> Merged:
     # One reading in all but a billionth of the readouts: what is left is rounding of the arithmetic, by which two
     # signals would seem separated with certainty. Two readings of a capture are at least 1 DN apart.
     constant = variance < np.maximum(_CERTAIN_DN2, _ROUNDING * mean**2)
-    return Merged(np.where(constant, np.round(mean, 6), mean), np.where(constant, 0.0, variance), result.certain)
+    return Merged(np.where(constant, np.round(mean, 6), mean), np.where(constant, 0.0, variance))
 
 
 def _step_dn(dn: SameShape, pixel: Pixel) -> SameShape:
@@ -121,7 +117,7 @@ def _over_gains(electrons: PerCapture, light: PerCapture, pixel: Pixel) -> Merge
         block = _merged(electrons[:, None] * gains, light[:, None], pixel)
         for weight, value, variance in zip(weights[part], block.mean - about.mean, block.variance, strict=True):
             mean, square, spread = mean + weight * value, square + weight * value**2, spread + weight * variance
-    return Merged(about.mean + mean, spread + square - mean**2, about.certain)
+    return Merged(about.mean + mean, spread + square - mean**2)
 
 
 def _merged(electrons: PerCapture, light: PerCapture, pixel: Pixel) -> Merged:
@@ -141,9 +137,8 @@ def _merged(electrons: PerCapture, light: PerCapture, pixel: Pixel) -> Merged:
     for share, mean, _ in parts:
         total = total + share * mean
     variance = sum(share * (spread + (mean - total) ** 2) for share, mean, spread in parts)
-    certain = np.asarray(np.any([share >= _CERTAIN for share, *_ in parts], axis=0))
     gain = pixel.dn_per_e
-    return Merged(gain * total + offset, np.asarray(gain**2 * variance, dtype=float), certain)
+    return Merged(gain * total + offset, np.asarray(gain**2 * variance, dtype=float))
 
 
 def _combined(
@@ -158,37 +153,6 @@ def _combined(
             if other_at == at:
                 variance = variance + share * other_weight / light[at] * moments[at].covariance_e2[number, other]
     return mean, variance
-
-
-def shape_of_noise(
-    electrons: PerCapture, light: PerCapture, pixel: Pixel
-) -> tuple[Bool[BoolArray, "*batch"], SameShape]:
-    """Return the shape of the noise of merged values.
-
-    Returns `gaussian`: True where the noise may be taken as Gaussian; `reach_dn`: largest distance from the mean with a
-    probability above 1e-15, DN of the first capture.
-    """
-    least, most = (electrons * (1 + sign * DRAWN * pixel.prnu) for sign in (-1, 1))
-    low, high = (_merged(of_gain, light, pixel).certain for of_gain in (least, most))
-    gaussian, reach_dn = low & high, np.zeros(electrons.shape[1:])
-    for at, exposure in enumerate(pixel.exposures):
-        expected = electrons[at]
-        for number in exposure.numbers:
-            capture, limit_dn = pixel.read_as[number], limits_dn(pixel)[number]
-            noise_e = np.sqrt(expected + (capture.prnu * expected) ** 2 + capture.read_noise_e**2)
-            limit_e = np.inf if limit_dn is None else (limit_dn - capture.offset_dn) / capture.dn_per_e
-            used = expected - 9 * noise_e - 27 < limit_e
-            low_e, high_e = unclipped_e(capture)
-            dithered = capture.dn_per_e * capture.read_noise_e >= DITHERED_DN
-            fine = (expected >= low_e) & (expected <= high_e)
-            fine &= dithered | (capture.dn_per_e * noise_e >= MANY_STEPS**0.5)
-            gaussian &= (fine | ~used) & ((most[at] < limit_e) | (least[at] > limit_e))
-            reach_e = (
-                9 * (np.sqrt(expected) + capture.prnu * expected + capture.read_noise_e) + 27 + 1 / capture.dn_per_e
-            )
-            # Its mean, if it is used, is within its reach of the expected number, and so is the mean of all.
-            reach_dn = np.maximum(reach_dn, np.where(used, 2 * reach_e * pixel.dn_per_e / light[at], 0.0))
-    return gaussian, reach_dn
 
 
 def weights_of(

@@ -1,4 +1,4 @@
-"""Rounding of an ADC, and the noise that hides its steps."""
+"""Rounding of an ADC."""
 
 from __future__ import annotations
 
@@ -8,11 +8,6 @@ import numpy as np
 
 from ...base.types import SameShape
 from ..pixel import Pixel
-
-DITHERED_DN = 0.7
-"""Read noise, DN, from which on rounding shows in no error."""
-MANY_STEPS = 16.0
-"""Variance in squared steps, from which on it shows in none, either."""
 
 
 def rounded(dn: SameShape, pixel: Pixel) -> SameShape:

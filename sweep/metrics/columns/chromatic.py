@@ -10,8 +10,8 @@ from ...base.types import PerDesign
 from ...camera.brightness import room_dn, room_of
 from ...spectra.lights import Pair, class_pairs, pair_name
 from ..batch import Batch, CaseReadings, DistanceKind
-from ..brightness import error_of
 from ..chromatic import chromatic_along, chromatic_rows, chromatic_separations
+from ..discrimination import error_of
 from ..metric import Metric
 from ..quantity import DN, Columns, Quantity, RequestedQuantities
 from .confusion import ERROR
@@ -141,8 +141,8 @@ class ChromaticConfusion(Metric):
                     name=pair_name(CHROMATIC_ERROR, pair),
                     metric=CHROMATIC_ERROR,
                     meaning="how often noise turns a light into one of another type of any brightness, for the worst "
-                    "two: the error of Gaussians at the smallest chromatic d', Q(d'/2), and at least that of equal "
-                    "brightness, `error_<a>_<b>`",
+                    "two: Q(d'/2) of the smallest chromatic d', which of few pixels beside a full well or a handover "
+                    "may be too small; at least the error of equal brightness, `error_<a>_<b>`",
                     label=f"chromatic {pair[0]}/{pair[1]} error",
                     direction="less",
                     pair=pair,
