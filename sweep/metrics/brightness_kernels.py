@@ -108,7 +108,7 @@ def nearest_on_curves(  # noqa: PLR0912, PLR0915  (one pass over pairs, blocks, 
                             of_noise += place * (curve_variance[curve, node + 1, c] - of_noise)
                             difference[c], second_spread[c] = point[c] - there, max(of_noise, least)
                             total += difference[c] ** 2 * _weight(spread[c], of_noise, least, w)
-                        if total >= best:
+                        if total >= min(best, margin * nearest):
                             continue
                         if least > 0.0:
                             w_here = balance(difference, first_spread, second_spread)

@@ -72,7 +72,7 @@ def _compared(study: Study, rules: Rules, space: Space, scenario: str, rows: Seq
     setup = study.setup(space, scenario)
     reference = replace(setup.with_all_effects, accuracy=REFERENCE)
     needs = {name: metric.needs for metric in METRICS for name in (q.name for q in metric.quantities(rules.requested))}
-    named = {name: of for name, of in rules.quantities.items() if name in rows[0]}
+    named = {name: of for name, of in rules.at(scenario, rules.wanted).quantities.items() if name in rows[0]}
     images = {name for name, of in named.items() if needs.get(of.of or name) == _IMAGES}
     if images & set(study.objective.weights):
         images.add(COMBINED)

@@ -17,7 +17,7 @@ from ..designs.block import Block, CurveBlock, edges_of_some
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, NONE, Tolerance
 from ..metrics.bound import Bound
-from ..metrics.columns.chromatic import CHROMATIC_CSD
+from ..metrics.columns.chromatic import CHROMATIC_CSD, CHROMATIC_DPRIME, CHROMATIC_ERROR
 from ..metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD
 from ..metrics.evaluate import evaluate
 from ..metrics.metric import Metric
@@ -37,7 +37,8 @@ _MOST_LETTERS = 200
 class Rules:
     """Rules by which designs become rows.
 
-    `schema`: of the rows of a run; `shown`: of those that its report shows; `places`: of the scenes on the axes.
+    `schema`: of the rows of a run; `shown`: of those that its report shows; `places`: of the scenes on the axes;
+    `in_series`: scenes after the first of their series, whose rows have the `asked` quantities alone.
     """
 
     schema: pa.Schema
@@ -51,6 +52,15 @@ class Rules:
     vision: Vision | None
     seed: int
     places: Mapping[str, Mapping[str, str | float]]
+    in_series: frozenset[str]
+    asked: frozenset[str]
+
+    def at(self, scenario: str, wanted: Wanted) -> Wanted:
+        """Return what of some quantities the rows of a scene have."""
+        if scenario not in self.in_series:
+            return wanted
+        asked = {name: quantity for name, quantity in wanted.quantities.items() if name in self.asked}
+        return Wanted.of(asked, self.requested, wanted.schema)
 
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
@@ -88,6 +98,12 @@ class Wanted:
         pairs = dict.fromkeys(q.pair for q in quantities.values() if q.metric in of_any and q.pair and not q.extreme)
         user_metrics = [metric for metric in requested.user_metrics if metric.name in quantities]
         return cls(schema, quantities, tuple(metrics), tuple(pairs), tuple(user_metrics))
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of the quantities, and of those that they are made of."""
+        names = {name for of in self.quantities.values() for name in (of.name, of.of) if name}
+        return frozenset(names | {name.replace(CHROMATIC_ERROR, CHROMATIC_DPRIME) for name in names})
 
     def of_extreme(self, extreme: str) -> list[Quantity]:
         """Return the worst cases, or the yields, among the quantities."""
@@ -147,6 +163,7 @@ def columns_of_points(
         family=None if space.filter is None else space.filter.family,
         points=points,
         images=None if rules.vision is None else SeededVision(rules.vision, rules.seed),
+        refined=wanted.names,
     )
     if worst := wanted.of_extreme(WORST_CASE):
         columns |= worst_cases(space, model, points, columns, worst, rules.tolerance, wanted.user_metrics)

@@ -20,14 +20,15 @@ from ..metrics.columns.chromatic import CHROMATIC_CSD
 from ..metrics.columns.exposure import EXPOSURE
 from ..metrics.columns.tasks import PREFIX
 from ..metrics.pareto import non_dominated
-from ..metrics.quantity import Columns, Quantity
+from ..metrics.quantity import DN, Columns, Quantity
+from ..metrics.separation import csd_name
 from ..results.dictionary import described
 from ..results.identity import CHUNK
 from ..results.shown import Selection
 from ..results.tables import ON_FRONT, SWEPT, result_schema, word_mask
 from ..spectra.lights import pair_name
 from ..study import Study
-from ..study.axes import axes_of, places_of
+from ..study.axes import axes_of, places_of, series_of
 from .routes import Rules, Wanted, quantities_at
 
 _MOST_CHUNKS, _LEAST_JOBS = 16, 64
@@ -130,9 +131,20 @@ def swept_quantities(study: Study) -> Mapping[str, Quantity]:
     }
 
 
+def _asked(study: Study) -> frozenset[str]:
+    """Return the quantities that a study names, their nominal values, and all but distances of two types in DN."""
+    quantities = study.quantities
+    asked = {*study.constraints, *study.objective.weights, *study.trade_off}
+    asked |= {quantities[name].of for name in asked}
+    asked |= {csd_name(pair) for name in study.trade_off if (pair := quantities[name].pair) is not None}
+    return frozenset(name for name, of in quantities.items() if name in asked or of.pair is None or of.unit != DN)
+
+
 def rules_of(study: Study) -> Rules:
     """Return the rules of a study."""
     section, quantities, swept = study.section, study.quantities, swept_quantities(study)
+    beyond = {name for scenes in series_of(study.scenarios).values() for name in [*scenes][1:]}
+    leading = set() if study.search is None else {study.search.scenario}
     axes, searched = axes_of(study.scenarios), study.search is not None
     return Rules(
         places=places_of(study.scenarios),
@@ -148,6 +160,8 @@ def rules_of(study: Study) -> Rules:
         plans=study.plans,
         vision=section.vision,
         seed=section.seed,
+        in_series=frozenset(beyond - leading if section.columns == "asked" else ()),
+        asked=_asked(study),
     )
 
 
@@ -211,6 +225,7 @@ def rows_of(at: Rows, setup: Setup, rules: Rules, wanted: Wanted) -> pa.Table:
     `pareto` marks the non-dominated ones of these alone, among those that meet every constraint but those on the
     front's axes.
     """
+    wanted = rules.at(at.scenario, wanted)
     columns, issues = quantities_at(at.space, at.numbers, setup, rules, wanted)
     n = len(at.numbers)
     ok = np.ones(n, dtype=bool)

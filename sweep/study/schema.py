@@ -300,9 +300,11 @@ class StudySection(Section):
     ] = {"chart": Scene()}
     """Scenes, by name: exposure, target, optics, weather, noise."""
     columns: Literal["asked", "all"] = "asked"
-    """Columns of swept designs in `results.parquet`: `asked` (CSDs, sensitivities, exposure, the chromatic CSD of the
+    """Columns in `results.parquet`: of swept designs `asked` (CSDs, sensitivities, exposure, the chromatic CSD of the
     objective's types, own metrics, and what objective, constraints and front name), or `all`. `pareto.parquet` and
-    `designs.parquet` have all columns of the front, of plain CFAs, named designs and the best."""
+    `designs.parquet` have all columns of the front, of plain CFAs, named designs and the best. Where one number tells
+    scenarios apart, distances in DN that neither objective, constraints nor front name are of the first one alone, or,
+    with `all`, of all."""
     tolerance_dn: Annotated[float, Field(ge=1e-12, le=1e12)] = 0.1
     """By how much the simulation may change any CSD, DN."""
     accuracy: AccuracySection = STANDARD
