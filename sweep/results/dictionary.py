@@ -113,7 +113,8 @@ def columns_table() -> list[str]:
 
 FILES = {
     f"{files.RESULTS}/": "a row per design and scenario, a dataset of parts, with the columns that a study asks "
-    "for, or all that are below (`columns: all`, or a study without sweeps)",
+    "for, or all that are below (`columns: all`, or a study without sweeps; of scenarios that one number tells apart, "
+    "distances that the study does not name are of the first alone)",
     files.PARETO: "the Pareto front of each CFA and scenario, with all columns",
     files.DESIGNS: "designs that the report shows: plain CFAs, named designs, answers of the search, the best of each "
     "sweep, those that lead, and a sample of the front, with all columns; and up to "

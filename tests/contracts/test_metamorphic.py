@@ -22,6 +22,7 @@ lights:
   files:
     - {file: leds.csv, signals: {green: [g1, g2, g3], yellow: [y1, y2, y3], red: [r1, r2, r3]}}
 pixel: {read_noise_e: 2, offset_dn: 64, dark_e_per_s: 20}
+columns: all
 scenarios:
   chart: {exposure: {kind: white_patch, level: 0.9}}
   night: {intensity_cd: 200, background_cd_m2: 5, exposure: {kind: fixed, exposure_s: 0.0008}, noise: true}

@@ -17,7 +17,7 @@ from ..build import load, one_line, output_of
 from ..commanded import commanded
 from ..golden import numbers_of
 
-HEAD = "study: axes\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RYYCy]\n"
+HEAD = "study: axes\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RYYCy]\ncolumns: all\n"
 FAR = "target: {distance_m: 60, fov_deg: 60, phase_px: [0.3, 0.2]}, optics: {f_number: 2}"
 
 
@@ -49,6 +49,28 @@ def test_a_series_has_its_key_and_value_as_columns(tmp_path: Path) -> None:
     assert {name: scene.at for name, scene in again.scenarios.items()} == {
         name: scene.at for name, scene in load(tmp_path, text).scenarios.items()
     }
+
+
+def test_scenes_after_the_first_of_a_series_have_what_is_asked_for(tmp_path: Path) -> None:
+    text = f"{HEAD}recognition: {{}}\nobjective: chromatic_csd_yellow_red\nscenarios: {{s: {{noise: true, {FAR}, each: {{pixel.bits: [8, 12]}}}}}}\n"
+    for folder in ("asked", "all"):
+        (tmp_path / folder).mkdir()
+    asked = output_of(tmp_path / "asked", text.replace("columns: all\n", "")).table
+    every = output_of(tmp_path / "all", text).table
+    first, other = (asked[asked["value"] == bits] for bits in (8, 12))
+    assert not first.isna().any()["chromatic_csd_green_red"]
+    known = {
+        "csd_yellow_red",
+        "chromatic_csd_yellow_red",
+        "dprime_green_red",
+        "chromatic_error_green_red",
+        "state_error",
+    }
+    left_out = {name for name in other if other[name].isna().all() and not every[name].isna().all()}
+    assert {"csd_green_red", "pixel_csd_yellow_red", "chromatic_csd_green_red"} <= left_out
+    assert not known & left_out
+    for name in set(asked) - left_out - {"simulation_key"}:
+        assert asked[name].equals(every[name]), name
 
 
 def test_electrons_grow_with_the_square_of_the_pitch(tmp_path: Path) -> None:
