@@ -81,6 +81,7 @@ def evaluate(
     batch.columns = over_cases(model, batch.by_case, quantities) | {EXPOSURE: batch.exposure_s}
     if can_refine(model.setup):
         wanted_names = frozenset(batch.by_case if refined is None else refined)
+        wanted_names |= {name.replace(CHROMATIC_ERROR, CHROMATIC_DPRIME) for name in wanted_names}
         for sought, of in (
             (_of_readings(batch, readings, of_readings, wanted_names), model),
             (_under_noise(batch, others, wanted_names), model),
@@ -148,10 +149,9 @@ def evaluate_some(
     """Return quantities of one design, by no more than they need."""
     metrics, names = {quantity.metric for quantity in quantities}, {quantity.name for quantity in quantities}
     camera = model.setup.camera
-    if CHROMATIC_ERROR in metrics:
-        names |= {name.replace(CHROMATIC_ERROR, CHROMATIC_DPRIME) for name in names}
-        if few_pixels(model.setup.scene, camera.pixel, camera.mosaic) is not None:  # exact sums may be larger
-            metrics.add(ERROR)
+    has_sums = few_pixels(model.setup.scene, camera.pixel, camera.mosaic) is not None
+    if CHROMATIC_ERROR in metrics and has_sums:  # exact sums may be larger
+        metrics.add(ERROR)
     requested = RequestedQuantities(model.setup.lights.classes, tuple(states), flicker=True)
     owners = [metric for metric in METRICS if metrics & {of.metric for of in metric.quantities(requested)}]
     chromatic = [quantity.pair for quantity in quantities if quantity.metric in CHROMATIC.values() and quantity.pair]

@@ -418,10 +418,12 @@ def conditions(run: Run) -> Pairs:
     )
     parts.append("with noise" if any(scene.noise for scene in scenes) else "no noise")
     found.append(("scene", ", ".join(parts)))
-    if run.study.recognition is not None:
+    read_under_noise = [(scene, pixel) for scene, pixel in zip(scenes, pixels, strict=True) if scene.noise]
+    if run.study.recognition is not None and read_under_noise:
         mosaics = [run.output.mosaic(cfa) for cfa in run.study.cfas]
-        few = [few_pixels(*both, mosaic) for both in zip(scenes, pixels, strict=True) for mosaic in mosaics]
-        found.append(("errors", "Q(d'/2)" if None in few else "exact sums; of any brightness Q(d'/2)"))
+        summed = {few_pixels(*reading, mosaic) is not None for reading in read_under_noise for mosaic in mosaics}
+        of_some = "exact sums of few pixels, else Q(d'/2)" if False in summed else "exact sums"
+        found.append(("errors", f"{of_some}; of any brightness Q(d'/2)" if True in summed else "Q(d'/2)"))
     limits = []
     for name, bound in run.output.constraints.items():
         column = run.output.columns.get(name)

@@ -17,7 +17,7 @@ from ..designs.block import Block, CurveBlock, edges_of_some
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, NONE, Tolerance
 from ..metrics.bound import Bound
-from ..metrics.columns.chromatic import CHROMATIC_CSD, CHROMATIC_DPRIME, CHROMATIC_ERROR
+from ..metrics.columns.chromatic import CHROMATIC_CSD
 from ..metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD
 from ..metrics.evaluate import evaluate
 from ..metrics.metric import Metric
@@ -101,9 +101,8 @@ class Wanted:
 
     @property
     def names(self) -> frozenset[str]:
-        """Names of the quantities, and of those that they are made of."""
-        names = {name for of in self.quantities.values() for name in (of.name, of.of) if name}
-        return frozenset(names | {name.replace(CHROMATIC_ERROR, CHROMATIC_DPRIME) for name in names})
+        """Names of the quantities, and of their nominal values."""
+        return frozenset(name for of in self.quantities.values() for name in (of.name, of.of) if name)
 
     def of_extreme(self, extreme: str) -> list[Quantity]:
         """Return the worst cases, or the yields, among the quantities."""

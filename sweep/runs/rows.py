@@ -117,9 +117,7 @@ def swept_quantities(study: Study) -> Mapping[str, Quantity]:
     if study.section.columns == "all" or not any(space.kind == "sweep" for space in study.spaces):
         return quantities
     pair = quantities[study.trade_off[0]].pair
-    asked = {*study.constraints, *study.objective.weights, study.objective.column, *study.trade_off, EXPOSURE}
-    asked |= {quantities[name].of for name in asked}
-    asked |= {metric.name for metric in study.user_metrics}
+    asked = {*_named(study), EXPOSURE, *(metric.name for metric in study.user_metrics)}
     if study.has_swept_tasks:
         asked |= {name for name, quantity in quantities.items() if quantity.metric.startswith(PREFIX)}
     return {
@@ -131,13 +129,17 @@ def swept_quantities(study: Study) -> Mapping[str, Quantity]:
     }
 
 
-def _asked(study: Study) -> frozenset[str]:
-    """Return the quantities that a study names, their nominal values, and all but distances of two types in DN."""
-    quantities = study.quantities
-    asked = {*study.constraints, *study.objective.weights, *study.trade_off}
-    asked |= {quantities[name].of for name in asked}
-    asked |= {csd_name(pair) for name in study.trade_off if (pair := quantities[name].pair) is not None}
-    return frozenset(name for name, of in quantities.items() if name in asked or of.pair is None or of.unit != DN)
+def _named(study: Study) -> set[str]:
+    """Return the quantities of constraints, objective and front, and their nominal values."""
+    names = {*study.constraints, *study.objective.weights, study.objective.column, *study.trade_off}
+    return names | {study.quantities[name].of for name in names}
+
+
+def _in_every_scene(study: Study) -> frozenset[str]:
+    """Return the quantities that each scene of a series has: all but distances in DN that the study does not name."""
+    names, quantities = _named(study), study.quantities
+    names |= {csd_name(pair) for name in study.trade_off if (pair := quantities[name].pair) is not None}
+    return frozenset(name for name, of in quantities.items() if name in names or of.pair is None or of.unit != DN)
 
 
 def rules_of(study: Study) -> Rules:
@@ -161,7 +163,7 @@ def rules_of(study: Study) -> Rules:
         vision=section.vision,
         seed=section.seed,
         in_series=frozenset(beyond - leading if section.columns == "asked" else ()),
-        asked=_asked(study),
+        asked=_in_every_scene(study),
     )
 
 
