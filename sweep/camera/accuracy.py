@@ -28,9 +28,6 @@ class Accuracy(Section):
     """Wavelength step of the point spread function, linear in between; a coarser grid is not refined."""
     pwm_moments: int = Field(default=9, ge=2, le=1000)
     """Moments of a pulse behind a nonlinear readout, eight times as many at the worst phase."""
-    brightness_steps: int = Field(default=1, ge=1, le=64)
-    """Nodes of the brightness curves of lamps that fill or merge pixels, relative to those of `standard`; chromatic
-    figures are refined between them."""
 
     @property
     def phase_steps_per_px(self) -> int:
@@ -47,7 +44,6 @@ PRESETS: dict[str, Accuracy] = {
         field_positions=129,
         psf_step_nm=1e-3,
         pwm_moments=17,
-        brightness_steps=4,
     ),
 }
 REFERENCE = PRESETS["reference"]

@@ -6,19 +6,37 @@ merge and noise follow. The curve is smooth but for a knee wherever a pixel fill
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..base.types import Array, Bool, BoolArray, DesignSignals, Float, IndexArray, Int, PerChannel, PerDesign, PerValue
+from ..base.types import (
+    Array,
+    Bool,
+    BoolArray,
+    DesignSignals,
+    Float,
+    FloatArray,
+    IndexArray,
+    Int,
+    PerChannel,
+    PerDesign,
+    PerValue,
+)
 from .effects import any_filter
+from .noise.law import Law, law_of, pixel_law, stacked
 from .noise.merge import merged, without_noise
 from .noise.pixel_curve import PixelCurve, groups_of, pixel_curve, same_electrons
 from .noise.table import unclipped_e
 from .pixel import unquantized
 from .readout import Readout
 from .setup import Setup
+
+if TYPE_CHECKING:
+    from .noise.law_kernels import Lamps
 
 _LEAST_E = 0.05
 """Electrons of the brightest pixel at the dimmest node beside dark."""
@@ -46,7 +64,8 @@ class LampReadings:
 
     `lit_e` and `dark_e`: electrons of the lamps at the brightness of the scene, and without lamps. `light`: of the
     exposures on the elements, relative to a pixel of full sensitivity. `readout`: that of the case alone. Pixels with
-    the same light are one element; `n_pixels` counts all pixels.
+    the same light are one element; `n_pixels` counts all pixels. `cases`: numbers of the cases that differ from this
+    one in the brightness of all lamps alone, `scales`.
     """
 
     lit_e: Float[Array, "captures signals pixels"]
@@ -55,6 +74,8 @@ class LampReadings:
     readout: Readout
     noisy: bool
     n_pixels: int
+    cases: Sequence[int] = (0,)
+    scales: Sequence[float] = (1.0,)
 
     @property
     def n_signals(self) -> int:
@@ -72,16 +93,10 @@ class LampReadings:
         weights, spread = self.readout.weights * factors, self.readout.spread_weights * factors**2
         return replace(self, readout=replace(self.readout, weights=weights, spread_weights=spread))
 
-    def alike(self, other: LampReadings, scale: float) -> bool:
-        """Return whether these are the lamps of another case with a scale of their light."""
-        same = self.dark_e.shape == other.dark_e.shape and same_electrons(self.dark_e, other.dark_e)
-        same = same and bool(np.array_equal(self.readout.weights, other.readout.weights))
-        return same and same_electrons(self.lit_e, scale * other.lit_e)
-
-    @property
-    def straight(self) -> bool:
-        """True if curves are straight between nodes: without noise, where nodes are the knees of all pixels."""
-        return not self.noisy and self.lit_e.shape[2] <= _MOST_KNEES and self.proportional
+    def of_cases(self) -> list[LampReadings]:
+        """Return the lamps of each case."""
+        cases = zip(self.cases, self.scales, strict=True)
+        return [replace(self, lit_e=scale * self.lit_e, cases=(case,), scales=(1.0,)) for case, scale in cases]
 
     @property
     def full_e(self) -> tuple[Float[Array, "signals pixels"], Float[Array, " pixels"]]:
@@ -103,20 +118,6 @@ class LampReadings:
         """Return what pixels read over their electrons, for groups of elements."""
         return [(pixel_curve(self.readout.pixel, light, noisy=self.noisy), at) for light, at in groups_of(self.light)]
 
-    def means(
-        self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"]
-    ) -> Float[Array, "signals factors channels"]:
-        """Return the mean of each channel, DN, as of `moments`."""
-        if not self.proportional:
-            return self.moments(signals, factors)[0]
-        if self.noisy:
-            return self._of_table(signals, factors, spread=False)[0]
-        full_e, curves = self._full_e_at(signals, factors), self.pixel_curves
-        mean = curves[0][0].mean(full_e)
-        for curve, at in curves[1:]:
-            mean[..., at] = curve.mean(full_e[..., at])
-        return np.asarray(mean @ self.readout.weights[0], dtype=float)
-
     def moments(
         self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"]
     ) -> tuple[Float[Array, "signals factors channels"], Float[Array, "signals factors channels"]]:
@@ -124,11 +125,12 @@ class LampReadings:
 
         `factors`: brightnesses of each of the `signals`.
         """
-        if self.proportional and self.noisy:
-            return self._of_table(signals, factors, spread=True)
         if self.proportional:
-            mean = self.means(signals, factors)
-            return mean, np.zeros(mean.shape)
+            from .noise.law_kernels import read_lamps  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+            mean, variance = np.empty((2, factors.size, self.readout.weights.shape[2]))
+            read_lamps(self.in_kernels, signals, np.ascontiguousarray(factors, dtype=float), mean, variance)
+            return mean.reshape(*factors.shape, -1), variance.reshape(*factors.shape, -1)
         electrons = self.lit_e[:, signals, None] * factors[..., None] + self.dark_e[:, None, None]
         pixel, light = self.readout.pixel, self.light[:, None, None]
         if self.noisy:
@@ -138,18 +140,6 @@ class LampReadings:
             mean = without_noise(electrons, light, pixel, rounds=False)
             variance = np.zeros(mean.shape)
         return mean @ self.readout.weights[0], variance @ self.readout.spread_weights[0]
-
-    def _of_table(
-        self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"], *, spread: bool
-    ) -> tuple[Float[Array, "signals factors channels"], Float[Array, "_ factors channels"]]:
-        """Return mean and variance from the tables of noisy pixels; the variance is empty if not asked for."""
-        (lit_e, dark_e), weights = self.full_e, (self.readout.weights[0], self.readout.spread_weights[0])
-        shape = (*factors.shape, weights[0].shape[1])
-        mean, variance = np.zeros(shape), np.zeros(shape if spread else (0, *shape[1:]))
-        for curve, at in self.pixel_curves:
-            of_pixels = weights[0][at], weights[1][at]
-            curve.table.add_moments(lit_e[signals][:, at], dark_e[at], factors, of_pixels, mean, variance)
-        return mean, variance
 
     def by_electrons(
         self, signals: Int[IndexArray, " values"], factors: PerValue
@@ -161,23 +151,55 @@ class LampReadings:
         lit_e, dark_e = self.full_e
         full_e = lit_e[signals] * factors[:, None] + dark_e
         by_mean, by_variance = np.empty(full_e.shape), np.empty(full_e.shape)
-        for curve, at in self.pixel_curves:
-            by_mean[:, at], by_variance[:, at] = curve.slopes(full_e[:, at])
+        law, groups = self.law
+        for number, (_, at) in enumerate(groups):
+            by_mean[:, at], by_variance[:, at] = law.at(number, full_e[:, at])[2:]
         return by_mean, by_variance
 
     def along(
         self, signals: Int[IndexArray, " values"], factors: PerValue
-    ) -> tuple[
-        Float[Array, "values channels"],
-        Float[Array, "values channels"],
-        Float[Array, "values channels"],
-        Float[Array, "values channels"],
-    ]:
+    ) -> tuple[Float[Array, "values channels"], ...]:
         """Return mean and variance of lamps, each at one brightness, and their derivatives by it."""
         mean, variance = (values[:, 0] for values in self.moments(signals, factors[:, None]))
-        lit_e = self.full_e[0][signals]
-        by_mean, by_variance = (slopes * lit_e for slopes in self.by_electrons(signals, factors))
+        by_mean, by_variance = (slopes * self.full_e[0][signals] for slopes in self.by_electrons(signals, factors))
         return mean, variance, by_mean @ self.readout.weights[0], by_variance @ self.readout.spread_weights[0]
+
+    @property
+    def law(self) -> tuple[Law, list[tuple[tuple[float, ...], Int[IndexArray, " _"]]]]:
+        """Return what pixels read, a table for the light of each group of elements, and these groups."""
+        groups = groups_of(self.light)
+        return pixel_law(self.readout.pixel, tuple(light for light, _ in groups), noisy=self.noisy), groups
+
+    @cached_property
+    def in_kernels(self) -> Lamps:
+        """Lamps as kernels take them, of a pixel's law, or of laws of each channel of each lamp over its brightness."""
+        if self.proportional:
+            (lit, dark), (law, groups) = self.full_e, self.law
+            tables = np.empty((self.n_signals, dark.size), dtype=np.intp)
+            for number, (_, at) in enumerate(groups):
+                tables[:, at] = number
+            weights, squares = self.readout.weights[0], self.readout.spread_weights[0]
+        else:
+            law, n = stacked(self._laws_of_brightness()), self.readout.weights.shape[2]
+            lit, dark, weights = np.ones((self.n_signals, n)), np.zeros(n), np.eye(n)
+            squares, tables = weights, np.arange(self.n_signals * n, dtype=np.intp).reshape(-1, n)
+        used = (weights != 0) | (squares != 0)
+        only = np.where(used.sum(axis=1) > 1, weights.shape[1], np.where(used.any(axis=1), used.argmax(axis=1), -1))
+        arrays = (np.ascontiguousarray(of) for of in (lit, dark, tables, *law, weights, squares, only))
+        return cast("Lamps", tuple(arrays))
+
+    def _laws_of_brightness(self) -> list[Law]:
+        """Return the law of each channel of each lamp over its brightness, through values at `nodes`."""
+        from scipy.interpolate import PchipInterpolator  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+        laws = []
+        for signal, own in enumerate(self.nodes(0.0, np.inf, 2)):
+            nodes = np.unique(np.append(0.0, own))
+            moments = self.moments(np.array([signal]), nodes[None])
+            for mean, variance in zip(moments[0][0].T, moments[1][0].T, strict=True):
+                values = np.stack([mean, variance])
+                laws.append(law_of(nodes, values, PchipInterpolator(nodes, values, axis=1)(nodes, 1)))
+        return laws
 
     def means_of_exposures(self, factors: Float[Array, "signals factors"]) -> Float[Array, "factors _ channels"]:
         """Return the means of all lamps, each exposure with its own share of their light.
@@ -186,18 +208,13 @@ class LampReadings:
         """
         every = np.arange(self.n_signals)
         if same_electrons(factors, np.broadcast_to(factors[:1], factors.shape)):
-            return np.moveaxis(self.means(every, np.broadcast_to(factors[0], (every.size, factors.shape[1]))), 0, 1)
+            distinct, which = np.unique(np.round(factors[0], _DIGITS), return_inverse=True)
+            means = self.moments(every, np.broadcast_to(distinct, (every.size, distinct.size)))[0]
+            return np.moveaxis(means[:, which], 0, 1)
         electrons = self.lit_e[:, None] * factors[:, :, None, None] + self.dark_e[:, None, None]
         pixel, light = self.readout.pixel, self.light[:, None, None]
         dn = merged(electrons, light, pixel).mean if self.noisy else without_noise(electrons, light, pixel)
         return np.asarray(dn @ self.readout.weights[0], dtype=float)
-
-    def _full_e_at(
-        self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"]
-    ) -> Float[Array, "signals factors pixels"]:
-        """Return electrons of a pixel of full sensitivity."""
-        lit_e, dark_e = self.full_e
-        return np.asarray(lit_e[signals, None] * factors[..., None] + dark_e)
 
     def nodes(self, least: float, most: float, steps: int) -> Float[Array, "signals nodes"]:
         """Return brightnesses between which curves are nearly straight, from dark to all full.
@@ -210,21 +227,18 @@ class LampReadings:
         lit_e, dark_e = lit_e[:, seen], dark_e[seen]
         curves = [(curve, np.flatnonzero(np.isin(np.flatnonzero(seen), at))) for curve, at in self.pixel_curves]
         brightest_e = np.maximum(lit_e.max(axis=1, keepdims=True), 1e-300)
-        full, knees, around = [], [], []
+        knees, around = list[FloatArray](), list[FloatArray]()
         deviations = np.linspace(-_AROUND_KNEE, _AROUND_KNEE, 4 * _AROUND_KNEE * steps + 1)
         for curve, at in curves:
             lit = np.maximum(lit_e[:, at], np.maximum(brightest_e / _MOST_RATIO, 1e-30))
             for knee_e, width in zip(curve.knees_e, curve.knee_widths, strict=True):
                 knees.append(np.maximum(knee_e - dark_e[at], 0.0) / lit)
                 around.append(knees[-1][..., None] * np.maximum(1 + width * deviations, 0.0))
-            full.append(knees[-1])
-        at_full, at_knees = np.concatenate(full, axis=1), np.concatenate(knees, axis=1)
+        at_knees = np.concatenate(knees, axis=1)
         last = np.concatenate(around, axis=1).max(axis=(1, 2))[:, None] * _BEYOND
         first = np.minimum(_LEAST_E / brightest_e, last / 2)
         parts = [np.zeros_like(last), last, last * 1e3]
-        if self.straight:
-            parts.append(at_full)
-        elif not self.noisy:
+        if not self.noisy:
             parts += [
                 at_knees * (1 - _BESIDE),
                 at_knees * (1 + _BESIDE),

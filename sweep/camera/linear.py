@@ -17,7 +17,8 @@ from .brightness import LampReadings, LampSlopes, room_dn
 from .exposure import relative_slope
 from .memory import blocks
 from .model import SceneModel, View, too_many
-from .noise.pixel_curve import STEPS_DN2, groups_of, pixel_curve
+from .noise.law import pixel_law
+from .noise.pixel_curve import STEPS_DN2, groups_of
 from .pixel import unquantized
 from .readout import Readout
 from .response import SplitLight
@@ -112,8 +113,7 @@ class LinearModel:
             moments[2], moments[3] = pixel.dn_per_e, pixel.dn_per_e**2 * (1 + 2 * pixel.prnu**2 * electrons)
             return moments
         for of_exposures, which in groups_of(self._read(view).capture_light):
-            curve = pixel_curve(self.hdr, of_exposures, noisy=True)
-            moments[..., which] = *curve.moments(electrons[..., which]), *curve.slopes(electrons[..., which])
+            moments[..., which] = pixel_law(self.hdr, (of_exposures,), noisy=True).at(0, electrons[..., which])
         moments[3] = np.where(moments[1] > STEPS_DN2, moments[3], 0.0)
         moments[1] = np.maximum(moments[1], STEPS_DN2)
         return moments

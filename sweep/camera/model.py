@@ -337,22 +337,29 @@ class SceneModel:
         return np.concatenate([self._white[0][:, None], *(electrons.along for electrons in columns)], axis=1)
 
     def lamps(self, curves: DesignCurves) -> Iterator[LampReadings]:
-        """Yield the readings of one design's lamps over their brightness, in each case; `curves` as of `read`."""
+        """Yield the readings of one design's lamps over their brightness; `curves` as of `read`.
+
+        Cases whose lamps differ in brightness alone, as the moments of a pulse, are one.
+        """
         exposure_s = self.exposure_s(curves)
         scales = self.scales(exposure_s)
+        moments, case = _alike_moments(scales), 0
+        different = scales[..., [of_moments[0] for of_moments, _ in moments]]
         for view in self.own_views():
-            electrons = view.captured(curves, scales, exposure_s)
-            dark = view.captured(curves, scales, exposure_s, lit=False)
+            electrons = view.captured(curves, different, exposure_s)
+            dark = view.captured(curves, different, exposure_s, lit=False)
             if not self.setup.camera.pixel.captures:
                 electrons, dark = electrons[None], dark[None]
-            moments = scales.shape[-1]
-            for phase in range(electrons.shape[2] // moments):
+            for phase in range(electrons.shape[2] // len(moments)):
                 readout = view.readout.subset(slice(phase, phase + 1))
-                part = slice(phase * moments, (phase + 1) * moments)
+                part = slice(phase * len(moments), (phase + 1) * len(moments))
                 lit, unlit = electrons[:, 0, part], dark[:, 0, part, 0]
                 alike = alike_pixels(lit.sum(axis=1), unlit.sum(axis=1), readout)  # at every moment of a pulse
-                for at in range(moments):
-                    yield of_case(lit[:, at], unlit[:, at], readout, alike, noisy=is_noisy(self.setup))
+                for at, (numbers, of_scale) in enumerate(moments):
+                    cases = [case + number for number in numbers]
+                    of_cases = of_case(lit[:, at], unlit[:, at], readout, alike, noisy=is_noisy(self.setup))
+                    yield replace(of_cases, cases=cases, scales=of_scale)
+                case += scales.shape[-1]
 
     def pixel_electrons(self, curves: DesignCurves) -> Float[Array, "*captures designs cases signals pixels"]:
         """Return expected electrons of the pixels that are read.
@@ -388,6 +395,19 @@ def _different_moments(
     flat = np.round(scales.reshape(-1, scales.shape[-1]), 12)
     _, first, which = np.unique(flat, axis=1, return_index=True, return_inverse=True)
     return first, which.ravel()
+
+
+def _alike_moments(scales: Float[Array, "... 1 moments"]) -> list[tuple[list[int], list[float]]]:
+    """Return groups of moments whose light differs by one factor in all exposures: brightest first, and the factors."""
+    columns = scales.reshape(-1, scales.shape[-1])
+    most = columns.max(axis=0)
+    kinds = np.round(columns / np.maximum(most, 1e-300), 12).T.tolist()
+    groups: dict[tuple[float, ...], list[int]] = {}
+    brightest = np.argsort(-most, kind="stable").tolist()
+    for moment in brightest:
+        lit = most[moment] > 0 or not groups
+        groups.setdefault(tuple(kinds[moment]) if lit else next(iter(groups)), []).append(moment)
+    return [(numbers, (most[numbers] / (most[numbers[0]] or 1.0)).tolist()) for numbers in groups.values()]
 
 
 @lru_cache(maxsize=8)

@@ -181,9 +181,10 @@ class Batch:
         lamps = [*model.lamps(self.curves_of(design))]
         if kind == "pixel":
             lamps = [of_case.times(pixel_roots(self.setup.camera.mosaic)) for of_case in lamps]
-        n_moments = len(lamps) // model.n_cases
+        n_cases = sum(len(of_case.cases) for of_case in lamps)
+        n_moments = n_cases // model.n_cases
         pairs = walk.at_moments if model.own_moments else [walk.at_any] * n_moments
-        distances = np.empty(len(lamps))
+        distances = np.empty(n_cases)
         for curves in curves_of(lamps, self.setup):
             of_cases = [pairs[case % n_moments] for case in curves.cases]
             distances[curves.cases] = curves.follow(of_cases, noise=kind == "noise")

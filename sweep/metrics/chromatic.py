@@ -167,11 +167,9 @@ def _nearest_rows(
     noise: bool,
 ) -> Rows:
     """Return squared distances of readings from the nearest points of curves."""
-    near = curves.nearest(first, second, noise=noise, margin=_SEEN)
-    active = np.flatnonzero(near.squared <= _SEEN * near.squared.min())
-    refined = curves.refined(near.subset(active), noise=noise)
-    factor = np.full(near.factor.size, curves.darkest)
-    factor[active] = curves.polished(refined, noise=noise)
+    near = curves.nearest(first, second, noise=noise, margin=_SEEN, polished=_SEEN)
+    factor, active = np.full(near.factor.size, curves.darkest), near.squared <= _SEEN * near.squared.min()
+    factor[active] = curves.settled(near.subset(active), noise=noise)
     of_reading = lamps.moments(near.reading, np.ones(near.reading.size))
     of_curve = lamps.moments(near.curve, factor)
 

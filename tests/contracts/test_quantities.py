@@ -94,7 +94,10 @@ def chromatic_in_noise(made: Made, quantity: Quantity) -> list[float]:
     """The least d' of a reading and one of a real lamp of any brightness, by a scan."""
     first, second = (made.setup.members[name] for name in quantity.pair or ())
     model = scene_model(made.setup.over_brightness)
-    cases = [[*model.lamps(made.curves[at : at + 1])] for at in range(len(made.curves))]
+    cases = [
+        [case for lamps in model.lamps(made.curves[at : at + 1]) for case in lamps.of_cases()]
+        for at in range(len(made.curves))
+    ]
     return [smallest(of_design, first, second, noise=True) for of_design in cases]
 
 

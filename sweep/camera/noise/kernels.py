@@ -198,59 +198,6 @@ def cubic_of_electrons(
 
 
 @njit(cache=True, nogil=True)
-def moments_of_lamps(
-    lit_e: FloatArray,
-    dark_e: FloatArray,
-    factors: FloatArray,
-    last_e: float,
-    nodes: FloatArray,
-    coefficients: FloatArray,
-    piece: IndexArray,
-    step: float,
-    weights: FloatArray,
-    spread_weights: FloatArray,
-    mean: FloatArray,
-    variance: FloatArray,
-) -> None:
-    """Add mean and variance of each channel of lamps at some brightnesses: weighed sums of a table over the pixels.
-
-    `coefficients`: of the mean and of the variance, see `cubic_of_electrons`; `variance`: empty where it is not wanted.
-    """
-    n_channels, wanted = weights.shape[1], variance.size > 0
-    means, variances, per_step = coefficients[0], coefficients[1], 1 / step
-    only = np.empty(weights.shape[0], np.intp)  # most pixels are of one channel
-    for p in range(only.size):
-        only[p] = -1
-        for c in range(n_channels):
-            if weights[p, c] != 0.0 or spread_weights[p, c] != 0.0:
-                only[p] = c if only[p] == -1 else n_channels
-    for s in range(factors.shape[0]):
-        for f in range(factors.shape[1]):
-            for p in range(only.size):
-                if only[p] == -1:
-                    continue
-                held = lit_e[s, p] * factors[s, f] + dark_e[p]
-                held = last_e if held > last_e else held
-                at = math.sqrt(held) if held >= 0.0 else np.nan
-                if not at >= 0.0:
-                    mean[s, f] = np.nan
-                    continue
-                k = piece[min(int(at * per_step), piece.size - 1)]
-                k += at >= nodes[k + 1] and k + 2 < nodes.size
-                d = at - nodes[k]
-                reading = ((means[k, 0] * d + means[k, 1]) * d + means[k, 2]) * d + means[k, 3]
-                spread = 0.0
-                if wanted:
-                    spread = ((variances[k, 0] * d + variances[k, 1]) * d + variances[k, 2]) * d + variances[k, 3]
-                    spread = max(spread, 0.0)
-                first = only[p] if only[p] < n_channels else 0
-                for c in range(first, first + 1 if only[p] < n_channels else n_channels):
-                    mean[s, f, c] += weights[p, c] * reading
-                    if wanted:
-                        variance[s, f, c] += spread_weights[p, c] * spread
-
-
-@njit(cache=True, nogil=True)
 def occurring(shares: FloatArray, rare: float) -> tuple[int, int]:
     """Return the range of shares without the rare ones at both ends.
 

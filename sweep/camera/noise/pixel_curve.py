@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,10 +17,6 @@ from ..setup import Setup
 from . import merge, moments, table
 from .merged_readings import ROOT_STEP, nodes_of
 
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
-
-_LEAST_ROOT = 1e-3
 _EQUAL, _NONE = 1e-9, 1e-12
 """Relative difference of electrons that are the same, and electrons that are none."""
 STEPS_DN2 = 1 / 12
@@ -71,17 +66,6 @@ class PixelCurve:
         spread = self.table.look_up(electrons, 1) if self.noisy else np.zeros(electrons.shape)
         return self.mean(electrons), np.maximum(spread, 0.0)
 
-    def slopes(self, electrons: SameShape) -> tuple[SameShape, SameShape]:
-        """Return the derivatives of mean and variance by the electrons."""
-        if not self.noisy:
-            linear = unquantized(electrons, self.pixel.read_once)
-            inside = np.abs(self._noiseless(electrons) - linear) <= 1e-9 * np.maximum(linear, 1.0)
-            return np.asarray(self.pixel.dn_per_e * inside, dtype=float), np.zeros(electrons.shape)
-        last = np.sqrt(self.table.last_e)
-        root = np.clip(np.sqrt(np.maximum(electrons, 0.0)), _LEAST_ROOT, last)
-        by_mean, by_variance = np.where(root < last, np.moveaxis(self._by_root(root), -1, 0) / (2 * root), 0.0)
-        return by_mean, by_variance
-
     def _noiseless(self, electrons: SameShape) -> SameShape:
         pixel = self.pixel
         if not pixel.captures:
@@ -93,14 +77,6 @@ class PixelCurve:
     def table(self) -> table.MomentTable:
         """Mean and variance of a noisy pixel over its electrons."""
         return _merged(self.pixel, self.light) if self.pixel.captures else _read_once(self.pixel)
-
-    @cached_property
-    def _by_root(self) -> PPoly:
-        """Derivatives of both moments by the root of the electrons, on the last axis."""
-        from scipy.interpolate import PPoly  # noqa: PLC0415  (slow to import: kept off the start-up path)
-
-        pieces = self.table.coefficients.T
-        return PPoly(pieces, self.table.nodes).derivative()
 
 
 @lru_cache(maxsize=16)
@@ -145,6 +121,8 @@ def same_electrons(
 
 def groups_of(light: Float[Array, "captures pixels"]) -> list[tuple[tuple[float, ...], Int[IndexArray, " _pixels"]]]:
     """Return the distinct columns of the light of exposures, and the elements of each."""
+    if (light == light[:, :1]).all():
+        return [(tuple(light[:, 0]), np.arange(light.shape[1]))]
     columns, which = np.unique(light, axis=1, return_inverse=True)
     return [(tuple(column), np.flatnonzero(which.ravel() == at)) for at, column in enumerate(columns.T)]
 

@@ -49,25 +49,6 @@ class MomentTable(NamedTuple):
         cubic_of_electrons(flat, self.last_e, *of_row, values.ravel())
         return values
 
-    def add_moments(
-        self,
-        lit_e: Float[Array, "signals pixels"],
-        dark_e: Float[Array, " pixels"],
-        factors: Float[Array, "signals factors"],
-        weights: tuple[Float[Array, "pixels channels"], Float[Array, "pixels channels"]],
-        mean: Float[Array, "signals factors channels"],
-        variance: Float[Array, "_ factors channels"],
-    ) -> None:
-        """Add mean and variance of channels that weigh pixels, of lamps at some brightnesses, in place.
-
-        `weights`: of means and of variances; `variance`: empty where it is not wanted. Of a table of these two.
-        """
-        from .kernels import moments_of_lamps  # noqa: PLC0415  (compiled: kept off the start-up path)
-
-        lit_e, factors, own, spread = (np.ascontiguousarray(values) for values in (lit_e, factors, *weights))
-        of_table = self.nodes, self.coefficients, self.piece, self.step
-        moments_of_lamps(lit_e, dark_e, factors, self.last_e, *of_table, own, spread, mean, variance)
-
 
 def mean_unrounded(electrons: SameShape, pixel: Pixel) -> SameShape:
     """Return the mean before rounding, DN."""
