@@ -27,10 +27,8 @@ from ..base.types import (
     PerValue,
 )
 from .effects import any_filter
-from .noise.law import Law, law_of, pixel_law, stacked
-from .noise.merge import merged, without_noise
-from .noise.pixel_curve import PixelCurve, groups_of, pixel_curve, same_electrons
-from .noise.table import unclipped_e
+from .noise.law import Law, groups_of, knees_of, law_of, pixel_law, same_electrons, stacked, unclipped_e
+from .noise.merge import exposure_of, merged, without_noise
 from .pixel import unquantized
 from .readout import Readout
 from .setup import Setup
@@ -108,15 +106,10 @@ class LampReadings:
         """True for lamps that fill a pixel of any channel, of an HDR pixel all its captures."""
         lit_e, dark_e = self.full_e
         full = np.zeros(self.n_signals, dtype=bool)
-        for curve, at in self.pixel_curves:
+        for light, at in groups_of(self.light):
             seen = at[self.readout.weights[0].max(axis=1)[at] > _SEEN * self.readout.weights[0].max()]
-            full |= (lit_e[:, seen] + dark_e[seen] >= curve.knees_e[-1]).any(axis=1)
+            full |= (lit_e[:, seen] + dark_e[seen] >= knees_of(self.readout.pixel, light)[-1]).any(axis=1)
         return full
-
-    @cached_property
-    def pixel_curves(self) -> list[tuple[PixelCurve, Int[IndexArray, " _"]]]:
-        """Return what pixels read over their electrons, for groups of elements."""
-        return [(pixel_curve(self.readout.pixel, light, noisy=self.noisy), at) for light, at in groups_of(self.light)]
 
     def moments(
         self, signals: Int[IndexArray, " signals"], factors: Float[Array, "signals factors"]
@@ -216,6 +209,15 @@ class LampReadings:
         dn = merged(electrons, light, pixel).mean if self.noisy else without_noise(electrons, light, pixel)
         return np.asarray(dn @ self.readout.weights[0], dtype=float)
 
+    def _knee_widths(self, light: tuple[float, ...]) -> Float[Array, " knees"]:
+        """Return the noise at each knee relative to its electrons; 0 without noise."""
+        pixel = self.readout.pixel
+        knees_e, shares = knees_of(pixel, light), [light[at] for at in exposure_of(pixel)]
+        if not self.noisy:
+            return np.zeros(knees_e.size)
+        counts, read_e = knees_e * shares, np.array([capture.read_noise_e for capture in pixel.read_as])
+        return np.asarray(np.sqrt(counts + read_e**2) / np.maximum(counts, 1e-9) + pixel.prnu, dtype=float)
+
     def nodes(self, least: float, most: float, steps: int) -> Float[Array, "signals nodes"]:
         """Return brightnesses between which curves are nearly straight, from dark to all full.
 
@@ -225,13 +227,12 @@ class LampReadings:
         weights = self.readout.weights[0]
         seen = weights.max(axis=1) > _SEEN * weights.max()
         lit_e, dark_e = lit_e[:, seen], dark_e[seen]
-        curves = [(curve, np.flatnonzero(np.isin(np.flatnonzero(seen), at))) for curve, at in self.pixel_curves]
-        brightest_e = np.maximum(lit_e.max(axis=1, keepdims=True), 1e-300)
+        brightest_e, of_pixels = np.maximum(lit_e.max(axis=1, keepdims=True), 1e-300), self.light[:, seen]
         knees, around = list[FloatArray](), list[FloatArray]()
         deviations = np.linspace(-_AROUND_KNEE, _AROUND_KNEE, 4 * _AROUND_KNEE * steps + 1)
-        for curve, at in curves:
+        for light, at in groups_of(of_pixels):
             lit = np.maximum(lit_e[:, at], np.maximum(brightest_e / _MOST_RATIO, 1e-30))
-            for knee_e, width in zip(curve.knees_e, curve.knee_widths, strict=True):
+            for knee_e, width in zip(knees_of(self.readout.pixel, light), self._knee_widths(light), strict=True):
                 knees.append(np.maximum(knee_e - dark_e[at], 0.0) / lit)
                 around.append(knees[-1][..., None] * np.maximum(1 + width * deviations, 0.0))
         at_knees = np.concatenate(knees, axis=1)

@@ -17,8 +17,7 @@ from .brightness import LampReadings, LampSlopes, room_dn
 from .exposure import relative_slope
 from .memory import blocks
 from .model import SceneModel, View, too_many
-from .noise.law import pixel_law
-from .noise.pixel_curve import STEPS_DN2, groups_of
+from .noise.law import STEPS_DN2, groups_of, pixel_law
 from .pixel import unquantized
 from .readout import Readout
 from .response import SplitLight

@@ -35,10 +35,9 @@ from .electrons import Electrons, FieldPosition
 from .exposure import exposure_times, fixed_white, white_irradiance
 from .field import field_heights, scene_at
 from .memory import blocks
-from .noise.pixel_curve import is_noisy
 from .phases import Phases, different_phases, scene_phases
 from .pixel import unquantized
-from .readout import NoisyReadout, Readout
+from .readout import NoisyReadout, Readout, is_noisy
 from .response import responses_of, uniform_response
 from .sampling import crosstalk_share
 from .setup import Setup

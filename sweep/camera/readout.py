@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.types import Array, DesignCases, DesignPixels, Float, IndexArray, Int, PerDesign, SameShape
-from .noise import merge, table
-from .noise.pixel_curve import PixelCurve, groups_of, pixel_curve, same_electrons
+from ..base.types import Array, DesignCases, DesignPixels, Float, IndexArray, Int, PerDesign
+from .noise import merge
+from .noise.law import groups_of, pixel_law, read_once_law, same_electrons
 from .noise.rounding import rounded
 from .pixel import Pixel, unquantized
 from .response import PixelResponse
@@ -84,43 +84,30 @@ class Readout:
         noisy = setup.scene.noise is not None
         if pixel.captures:
             light = self.capture_light_of(electrons)
-            return self._merged_means(electrons) if noisy else merge.without_noise(electrons, light, pixel)
+            return self._merged(electrons, 1)[0] if noisy else merge.without_noise(electrons, light, pixel)
         clips, rounds = setup.computes("saturation"), setup.computes("quantization")
         if noisy and setup.computes("noise"):
-            return (table.mean_rounded if rounds else table.mean_unrounded)(electrons, pixel)
+            return np.asarray(read_once_law(pixel, rounds=rounds).at(0, electrons, 1)[0])
         held = np.minimum(electrons, pixel.saturation_e) if clips else electrons
         if not rounds:
             return unquantized(held, pixel)
         if noisy:
-            dn = unquantized(held, pixel)
-            return dn + table.mean_rounded(electrons, pixel) - table.mean_unrounded(electrons, pixel)
+            means = [read_once_law(pixel, rounds=rounds).at(0, electrons, 1)[0] for rounds in (True, False)]
+            return np.asarray(unquantized(held, pixel) + means[0] - means[1])
         return rounded(held * pixel.dn_per_e, pixel)
 
-    def _merged_means(self, electrons: Float[Array, "captures designs cases signals pixels"]) -> DesignPixels:
-        """Return means of merged values: from a table where exposures have their fixed share of the electrons."""
-        if (full_e := self._full_e(electrons)) is None:
-            return merge.merged(electrons, self.capture_light_of(electrons), self.pixel).mean
-        means = np.empty(full_e.shape)
-        for curve, at in self._curves:
-            means[..., at] = curve.mean(full_e[..., at])
-        return means
-
-    def _merged_moments(
-        self, electrons: Float[Array, "captures designs cases signals pixels"]
-    ) -> tuple[DesignPixels, DesignPixels]:
-        """Return means and variances of merged values, from where means are."""
+    def _merged(
+        self, electrons: Float[Array, "captures designs cases signals pixels"], rows: int
+    ) -> list[DesignPixels]:
+        """Return means and variances of merged values: by a law where exposures have their fixed share of electrons."""
         if (full_e := self._full_e(electrons)) is None:
             values = merge.merged(electrons, self.capture_light_of(electrons), self.pixel)
-            return values.mean, values.variance
-        means, variances = np.empty(full_e.shape), np.empty(full_e.shape)
-        for curve, at in self._curves:
-            means[..., at], variances[..., at] = curve.moments(full_e[..., at])
-        return means, variances
-
-    @property
-    def _curves(self) -> list[tuple[PixelCurve, Int[IndexArray, " _elements"]]]:
-        """What groups of elements with the same light read over the electrons of a pixel of full sensitivity."""
-        return [(pixel_curve(self.pixel, light, noisy=True), at) for light, at in groups_of(self.capture_light)]
+            return [values.mean, values.variance][:rows]
+        result, groups = np.empty((rows, *full_e.shape)), groups_of(self.capture_light)
+        law = pixel_law(self.pixel, tuple(light for light, _ in groups))
+        for number, (_, at) in enumerate(groups):
+            result[..., at] = law.at(number, full_e[..., at], rows)
+        return [*result]
 
     def _full_e(self, electrons: Float[Array, "captures designs cases signals pixels"]) -> DesignPixels | None:
         """Return electrons of a pixel of full sensitivity; None where exposures have no fixed share of them."""
@@ -132,10 +119,6 @@ class Readout:
         """Return the relative light of exposures, broadcast to their electrons."""
         shape = (len(electrons), *(1,) * (electrons.ndim - 2), electrons.shape[-1])
         return self.capture_light.reshape(shape)
-
-    def variance_dn(self, electrons: SameShape) -> SameShape:
-        """Return the variance of the digital numbers, with rounding, DN^2."""
-        return table.variance(electrons, self.pixel)
 
     def folded(self, dn: Float[Array, "designs ... pixels"]) -> Float[Array, "designs ... channels"]:
         """Combine the elements to channels, DN.
@@ -159,9 +142,9 @@ class Readout:
         `electrons`: expected electrons; elements are pixels. Of an HDR pixel those of each exposure, on the first axis.
         """
         if self.pixel.captures:
-            mean, variance = self._merged_moments(electrons)
+            mean, variance = self._merged(electrons, 2)
             return self.folded(mean), self.spread(variance)
-        dn, variance_dn = self.transfer(electrons), self.variance_dn(electrons)
+        dn, variance_dn = read_once_law(self.pixel).at(0, electrons, 2)
         # A digital number that is the same in all but one of a billion readouts: what is left of its noise is
         # rounding of the arithmetic, by which two signals would seem separated with certainty.
         certain = variance_dn < _CERTAIN_DN2
@@ -178,3 +161,8 @@ class Readout:
         """Sum over the elements with weights."""
         repeats = values.shape[1] // self.n_cases
         return np.asarray(values @ np.repeat(weights, repeats, axis=0))
+
+
+def is_noisy(setup: Setup) -> bool:
+    """Return whether readings are means under noise."""
+    return setup.scene.noise is not None and setup.computes("noise")

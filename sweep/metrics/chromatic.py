@@ -17,7 +17,7 @@ import numpy as np
 
 from ..base.types import Array, DesignSignals, Float, IndexArray, Int, MemberNumbers, PerChannel, PerDesign, SameShape
 from ..camera.brightness import LampSlopes
-from ..camera.noise.pixel_curve import STEPS_DN2
+from ..camera.noise.law import STEPS_DN2
 from ..spectra.lights import Pair, class_pairs
 from .brightness import BrightnessCurves
 from .complex_step import Smooth

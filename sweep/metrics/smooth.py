@@ -24,7 +24,7 @@ from ..base.types import (
 )
 from ..camera.brightness import LampSlopes
 from ..camera.linear import LinearModel, linear_model
-from ..camera.noise.pixel_curve import STEPS_DN2
+from ..camera.noise.law import STEPS_DN2
 from ..camera.setup import Setup
 from ..designs.family import Family
 from ..spectra.lights import Pair

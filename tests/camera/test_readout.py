@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sweep.camera.model import SceneModel
-from sweep.camera.noise import moments, table
+from sweep.camera.noise import moments
+from sweep.camera.noise.law import pixel_law
 from sweep.camera.pixel import Pixel
 
 from .. import readout_oracle
@@ -38,7 +39,7 @@ def check(pixel: Pixel, electrons: float) -> None:
     wide = min(wide, pixel.full_scale_dn) + 1
     assert exact == pytest.approx(mean, abs=1e-9 * wide + 1e-12 * pixel.full_scale_dn)
     assert spread == pytest.approx(variance, abs=3e-9 * wide**2)
-    found = table.mean_rounded(np.array([electrons]), pixel)[0], table.variance(np.array([electrons]), pixel)[0]
+    found = pixel_law(pixel).at(0, np.array([electrons]), 2)[:, 0]
     assert found[0] == pytest.approx(mean, abs=3e-7 * wide)
     assert found[1] == pytest.approx(variance, abs=3e-6 * wide**2)
 

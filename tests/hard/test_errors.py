@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from sweep.camera.noise import errors as sums
+from sweep.camera.noise.law import pixel_law
 from sweep.camera.noise.merge import merged
-from sweep.camera.noise.table import mean_rounded, variance
 from sweep.camera.pixel import Pixel
 from sweep.metrics.discrimination import detectability, error_of
 
@@ -48,7 +48,8 @@ def moments(electrons: float, pixel: Pixel) -> tuple[float, float]:
         light = relative_light(pixel)[:, None]
         found = merged(light * electrons, light, pixel)
         return float(found.mean[0]), float(found.variance[0])
-    return float(mean_rounded(np.array([electrons]), pixel)[0]), float(variance(np.array([electrons]), pixel)[0])
+    mean, variance = pixel_law(pixel).at(0, np.array([electrons]), 2)[:, 0]
+    return float(mean), float(variance)
 
 
 def gaussian_error(first: float, second: float, pixel: Pixel, n: int) -> float:

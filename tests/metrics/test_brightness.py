@@ -11,7 +11,8 @@ import pytest
 
 from sweep.base.errors import StudyError
 from sweep.camera.model import SceneModel, scene_model
-from sweep.camera.noise import merge, table
+from sweep.camera.noise import merge
+from sweep.camera.noise.law import pixel_law
 from sweep.camera.pixel import Pixel
 from sweep.camera.setup import Setup
 from sweep.metrics.evaluate import evaluate
@@ -108,7 +109,7 @@ class Lamps:
             mean = self.first_usable(electrons, pixel)
             variance = np.zeros(mean.shape)
         elif self.noisy:
-            mean, variance = table.mean_rounded(electrons, pixel), table.variance(electrons, pixel)
+            mean, variance = pixel_law(pixel).at(0, electrons, 2)
         else:
             mean = np.minimum(electrons, pixel.saturation_e) * pixel.dn_per_e + pixel.offset_dn
             variance = np.zeros(mean.shape)

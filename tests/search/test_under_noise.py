@@ -11,7 +11,7 @@ import pytest
 from sweep.camera.accuracy import Accuracy
 from sweep.camera.linear import linear_model
 from sweep.camera.model import SceneModel
-from sweep.camera.noise.pixel_curve import STEPS_DN2
+from sweep.camera.noise.law import STEPS_DN2
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.mixture import AbsorptionBands, Mixture

@@ -171,33 +171,6 @@ def poisson_means(electrons: FloatArray, start: int, values: FloatArray, varianc
 
 
 @njit(cache=True, nogil=True)
-def cubic_of_electrons(
-    electrons: FloatArray,
-    last_e: float,
-    nodes: FloatArray,
-    coefficients: FloatArray,
-    piece: IndexArray,
-    step: float,
-    out: FloatArray,
-) -> None:
-    """Evaluate a table at expected electrons (see `table.MomentTable`); constant beyond `last_e`.
-
-    `step`: step in the root of the electrons.
-    """
-    for i in range(electrons.size):
-        held = electrons[i]
-        held = last_e if held > last_e else held
-        at = np.sqrt(held)
-        if not at >= 0:  # NaN stays NaN
-            out[i] = at
-            continue
-        k = piece[min(int(at / step), piece.size - 1)]
-        k += at >= nodes[k + 1] and k + 2 < nodes.size
-        s, cubic = at - nodes[k], coefficients[k]
-        out[i] = ((cubic[0] * s + cubic[1]) * s + cubic[2]) * s + cubic[3]
-
-
-@njit(cache=True, nogil=True)
 def occurring(shares: FloatArray, rare: float) -> tuple[int, int]:
     """Return the range of shares without the rare ones at both ends.
 

@@ -13,13 +13,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...base.types import Array, Float, IndexArray, Int, PerValue, SameShape
-from ..pixel import Pixel
-from .pixel_curve import pixel_curve
+from ..pixel import Pixel, unquantized
+from . import merge, moments
+from .merged_readings import nodes_of
 
-_OF_NOISE, _OF_VALUE, _LEAST = 1e-7, 1e-12, 1e-12
-"""How far cubics may be from the values they are drawn through: of the noise, and relative; variance, DN^2."""
-_MULTIPLES = 8
+_OF_NOISE, _OF_VARIANCE = 3e-11, 1e-7
+"""How far cubics may be from the means they are drawn through, of the noise, and from variances, relative."""
+_ROUNDING, _LEAST_DN2 = 1e-14, 1e-12
+_MULTIPLES = 3
 """Multiples of the root of the electrons at which the piece is known, for each piece."""
+_LEAST_PRNU = 1e-9
+"""A smaller PRNU spaces nodes as evenly, but for rounding."""
+_CUT, _CUT_ROOT = 1e-5, 1 / 64
+"""Share of the noise by which the ends of the range may shift an unclipped mean; step of the root of the electrons."""
+_EQUAL, _NONE = 1e-9, 1e-12
+"""Relative difference of electrons that are the same, and electrons that are none."""
+STEPS_DN2 = 1 / 12
+"""Least variance that a search takes, DN^2, as of rounding: a saturated pixel has none, and no direction to go."""
 
 
 class Law(NamedTuple):
@@ -40,14 +50,14 @@ class Law(NamedTuple):
     most: Float[Array, "tables pieces"]
     drop: Float[Array, " tables"]
 
-    def at(self, table: int, electrons: SameShape) -> Float[Array, " ..."]:
-        """Return mean and variance of a table at some electrons, and the slopes of both, on the first axis."""
+    def at(self, table: int, electrons: SameShape, rows: int = 4) -> Float[Array, " ..."]:
+        """Return mean and variance of a table at some electrons, and the slopes of both: so many, on the first axis."""
         from .law_kernels import values_and_slopes  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-        out, flat = np.empty((4, electrons.size)), np.ascontiguousarray(electrons, dtype=float).ravel()
+        out, flat = np.empty((rows, electrons.size)), np.ascontiguousarray(electrons, dtype=float).ravel()
         of_table = self.nodes[table], self.cubic[table], self.piece[table]
         values_and_slopes(flat, *of_table, float(self.step[table]), float(self.ends[table]), out)
-        return out.reshape(4, *electrons.shape)
+        return out.reshape(rows, *electrons.shape)
 
 
 def law_of(nodes: PerValue, values: Float[Array, "2 values"], slopes: Float[Array, "2 values"]) -> Law:
@@ -55,9 +65,9 @@ def law_of(nodes: PerValue, values: Float[Array, "2 values"], slopes: Float[Arra
     from .law_kernels import needed_nodes  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     noise = np.sqrt(np.maximum(values[1], 0.0))
-    near = np.stack([_OF_NOISE * noise + _OF_VALUE * np.abs(values[0]), _OF_NOISE * np.abs(values[1]) + _LEAST])
+    near = [_OF_NOISE * noise + _ROUNDING * np.abs(values[0]), _OF_VARIANCE * np.abs(values[1]) + _LEAST_DN2]
     needed = np.zeros(nodes.size, dtype=bool)
-    needed_nodes(nodes, values, slopes, near, needed)
+    needed_nodes(nodes, values, slopes, np.stack(near), needed)
     nodes, values, slopes = nodes[needed], values[:, needed], slopes[:, needed]
     width = np.diff(nodes)
     rise = np.diff(values, axis=1) / width
@@ -98,27 +108,108 @@ def _padded(parts: Sequence[Any]) -> Any:
 
 
 @lru_cache(maxsize=64)
-def pixel_law(pixel: Pixel, lights: tuple[tuple[float, ...], ...], *, noisy: bool) -> Law:
-    """Return the laws of a pixel, one for each light of its exposures relative to full sensitivity."""
-    return stacked([_pixel_law(pixel, light, noisy=noisy) for light in lights])
+def pixel_law(pixel: Pixel, lights: tuple[tuple[float, ...], ...] = ((1.0,),), *, noisy: bool = True) -> Law:
+    """Return the laws of a pixel, one for each light of its exposures relative to full sensitivity.
+
+    Without noise the reading is that before rounding.
+    """
+    if not noisy:
+        return stacked([_noiseless_law(pixel, light) for light in lights])
+    return stacked([_merged_law(pixel, light) if pixel.captures else read_once_law(pixel) for light in lights])
+
+
+def _noiseless_law(pixel: Pixel, light: tuple[float, ...]) -> Law:
+    """Return a straight line: captures agree until the last one is full."""
+    nodes = np.array([0.0, knees_of(pixel, light)[-1]])
+    mean, slope = unquantized(nodes, pixel.read_once), np.full(2, pixel.dn_per_e)
+    return law_of(nodes, np.stack([mean, np.zeros(2)]), np.stack([slope, np.zeros(2)]))
+
+
+@lru_cache(maxsize=16)
+def _merged_law(pixel: Pixel, light: tuple[float, ...]) -> Law:
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+    of_exposure = np.array(light)
+    roots_e, is_node = nodes_of(pixel, of_exposure)
+    nodes_e = roots_e[is_node]
+    at_nodes = merge.merged(nodes_e * of_exposure[:, None], of_exposure[:, None], pixel)
+    return _of_roots(CubicSpline(np.sqrt(nodes_e), np.stack([at_nodes.mean, at_nodes.variance]), axis=1), nodes_e[-1])
+
+
+@lru_cache(maxsize=16)
+def read_once_law(pixel: Pixel, *, rounds: bool = True) -> Law:
+    """Return the law of a pixel that is read once, with the mean before rounding if it does not round.
+
+    With PRNU the noise grows faster than the root of the electrons. Nodes are then equidistant in asinh(PRNU root) /
+    PRNU, twice the standard deviation.
+    """
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+    last_e, rows = (
+        moments.LinearRange.of(pixel).last_e,
+        [moments.ROUNDED if rounds else moments.UNROUNDED, moments.VARIANCE],
+    )
+    if not pixel.prnu:
+        spline = moments.table_without_prnu(pixel)
+        return _of_roots(CubicSpline(spline.x, spline(spline.x)[rows], axis=1), last_e)
+    prnu = max(pixel.prnu, _LEAST_PRNU)
+    last = np.arcsinh(prnu * np.sqrt(last_e)) / prnu
+    nodes = np.sinh(prnu * np.arange(0, last + 2 * moments.STEP, moments.STEP)) / prnu
+    return _of_roots(CubicSpline(nodes, moments.moments(nodes**2, pixel)[rows], axis=1), last_e)
+
+
+def _of_roots(spline: Any, last_e: float) -> Law:
+    """Return the law of mean and variance as splines over the root of the electrons."""
+    roots = np.sort(np.concatenate([spline.x, (spline.x[1:] + spline.x[:-1]) / 2]))
+    roots = np.append(roots[roots**2 < last_e], math.sqrt(last_e))
+    values, nodes = spline(roots), roots**2
+    slopes = spline(roots, 1) / (2 * np.maximum(roots, 1e-30))
+    slopes[:, 0] = (values[:, 1] - values[:, 0]) / nodes[1]
+    return law_of(nodes, values, slopes)
 
 
 @lru_cache(maxsize=64)
-def _pixel_law(pixel: Pixel, light: tuple[float, ...], *, noisy: bool) -> Law:
-    curve = pixel_curve(pixel, light, noisy=noisy)
-    if not noisy:
-        nodes = np.array([0.0, float(curve.knees_e[-1])])
-        mean = curve.mean(nodes)
-        slope = (mean[1] - mean[0]) / nodes[1]
-        return law_of(nodes, np.stack([mean, np.zeros(2)]), np.array([[slope, slope], [0.0, 0.0]]))
-    table = curve.table
-    between = np.concatenate([table.nodes, (table.nodes[1:] + table.nodes[:-1]) / 2])
-    roots = np.append(np.sort(between[between**2 < table.last_e]), math.sqrt(table.last_e))
-    piece = np.minimum(np.searchsorted(table.nodes, roots, side="right") - 1, table.nodes.size - 2)
-    d, c = roots - table.nodes[piece], table.coefficients[:, piece]
-    values = ((c[..., 0] * d + c[..., 1]) * d + c[..., 2]) * d + c[..., 3]
-    by_root = (3 * c[..., 0] * d + 2 * c[..., 1]) * d + c[..., 2]
-    nodes = roots**2
-    slopes = by_root / (2 * np.maximum(roots, 1e-30))
-    slopes[:, 0] = (values[:, 1] - values[:, 0]) / nodes[1]
-    return law_of(nodes, values, slopes)
+def unclipped_e(pixel: Pixel) -> tuple[float, float]:
+    """Return the range of electrons in which neither end shifts the mean by more than 1e-5 of the noise.
+
+    (1, 0) if it is empty.
+    """
+    law = read_once_law(pixel, rounds=False)
+    electrons = np.arange(0.0, math.sqrt(law.ends[0]), _CUT_ROOT) ** 2
+    sigma = pixel.dn_per_e * np.sqrt(electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2)
+    shift = law.at(0, electrons, 1)[0] - pixel.dn_per_e * electrons - pixel.offset_dn
+    unclipped = electrons[np.abs(shift) <= _CUT * sigma + 1e-9]
+    return (float(unclipped[0]), float(unclipped[-1])) if unclipped.size else (1.0, 0.0)
+
+
+def knees_of(pixel: Pixel, light: Sequence[float]) -> Float[Array, " knees"]:
+    """Return the electrons at which a capture hands over to the next, and from which on the last one is full."""
+    if not pixel.captures:
+        return np.array([pixel.saturation_e])
+    ends = [
+        (capture.saturation_e if limit is None else (limit - capture.offset_dn) / capture.dn_per_e) / light[exposure]
+        for exposure, capture, limit in zip(
+            merge.exposure_of(pixel), pixel.read_as, merge.limits_dn(pixel), strict=True
+        )
+    ]
+    return np.array(ends)
+
+
+def same_electrons(
+    first: Float[Array, "*batch pixels"],
+    second: Float[Array, "*batch pixels"],
+    share: float | Float[Array, " pixels"] = 1.0,
+) -> bool:
+    """Return whether electrons are the same but for rounding; `share`: of the second ones that the first have."""
+    from .kernels import all_near  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    one, other = (np.ascontiguousarray(electrons).reshape(-1, first.shape[-1]) for electrons in (first, second))
+    return bool(all_near(one, other, np.broadcast_to(share, first.shape[-1]), _EQUAL, _NONE))
+
+
+def groups_of(light: Float[Array, "captures pixels"]) -> list[tuple[tuple[float, ...], Int[IndexArray, " _pixels"]]]:
+    """Return the distinct columns of the light of exposures, and the elements of each."""
+    if (light == light[:, :1]).all():
+        return [(tuple(light[:, 0]), np.arange(light.shape[1]))]
+    columns, which = np.unique(light, axis=1, return_inverse=True)
+    return [(tuple(column), np.flatnonzero(which.ravel() == at)) for at, column in enumerate(columns.T)]

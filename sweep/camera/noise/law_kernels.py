@@ -194,7 +194,7 @@ def values_and_slopes(
     end: float,
     out: FloatArray,
 ) -> None:
-    """Write mean and variance of a pixel at some electrons, then the slopes of both."""
+    """Write mean and variance of a pixel at some electrons, then the slopes of both, as many as `out` has rows."""
     for at in range(electrons.size):
         e = electrons[at]
         if math.isnan(e):
@@ -205,9 +205,10 @@ def values_and_slopes(
         while nodes[k + 1] <= e and nodes[k + 1] < end:
             k += 1
         d = e - nodes[k]
-        for row in range(2):
+        for row in range(min(out.shape[0], 2)):
             x0, x1, x2, x3 = cubic[k, 4 * row], cubic[k, 4 * row + 1], cubic[k, 4 * row + 2], cubic[k, 4 * row + 3]
             out[row, at] = ((x3 * d + x2) * d + x1) * d + x0
-            out[2 + row, at] = 0.0 if full else (3.0 * x3 * d + 2.0 * x2) * d + x1
-        if out[1, at] < 0.0:
-            out[1, at] = out[3, at] = 0.0
+            if out.shape[0] == 4:
+                out[2 + row, at] = 0.0 if full else (3.0 * x3 * d + 2.0 * x2) * d + x1
+        if out.shape[0] > 1 and out[1, at] < 0.0:
+            out[1::2, at] = 0.0
