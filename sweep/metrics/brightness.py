@@ -27,6 +27,8 @@ _FOLLOWED = 1.1
 """Pairs that come as near as this times the nearest squared distance are looked at in other cases, too."""
 _POLISHED = 1.01
 """Those up to this times the smallest one are found to rounding."""
+_NONE = 1e-4
+"""Distance, in DN or units of the noise, to which a walk proves the smallest one."""
 _SCALE_DIGITS, _BESIDE = 12, 1e-5
 _ROOTS = 12
 """Segments of a curve before any is halved."""
@@ -166,9 +168,10 @@ class BrightnessCurves:
         return np.where(np.abs(step) < _BESIDE, factor * (1 - step), factor)
 
     def of_cases(self, points: Nearest) -> Float[Array, " cases"]:
-        """Return the smallest distance among some points in each case."""
+        """Return the smallest distance among some points in each case; 0 where no larger one is proven."""
         least = np.full(self._scales.size, np.inf)
         np.minimum.at(least, points.reading // self.lamps.n_signals, points.squared)
+        least[least <= _NONE**2] = 0.0
         return np.asarray(np.sqrt(least[self._scale_of_case]), dtype=float)
 
     def pairs_of(self, points: Nearest, case: int) -> Nearest:
