@@ -139,7 +139,7 @@ class BrightnessCurves:
         squared, factor = np.empty((2, curve.size))
         least = self._least_dn2 if noise else 0.0
         readings, roots, found = self._readings, self._roots, (squared, factor)
-        nearest(
+        self.unproven += nearest(
             self.lamps.in_kernels, readings, reading, curve, self._starts, roots, least, margin, polished, known, found
         )
         return Nearest(reading, curve, factor, squared)

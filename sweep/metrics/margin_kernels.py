@@ -16,10 +16,10 @@ _STEPS, _CLOSE = 60, 1e-9
 
 
 @njit(cache=True, nogil=True)
-def balance(difference: FloatArray, first: FloatArray, second: FloatArray) -> float:
+def balance(difference: FloatArray, first: FloatArray, second: FloatArray, near: float = 0.0) -> float:
     """Return w = l / (1 - l) for which the sum of D^2 / (Va / l + Vb / (1 - l)) is largest.
 
-    It is concave in l. Channels without difference or without variance have no say.
+    It is concave in l. Channels without difference or without variance have no say. `near`: a w beside it, if above 0.
     """
     apart = spread = 0.0
     low, high = np.inf, -np.inf
@@ -32,7 +32,7 @@ def balance(difference: FloatArray, first: FloatArray, second: FloatArray) -> fl
     if not low <= high:
         return 1.0
     low, high = max(low, -_FAR), min(high, _FAR)
-    at = 0.5 * (low + high)
+    at = min(max(math.log(near), low), high) if near > 0.0 else 0.5 * (low + high)
     for _ in range(_STEPS if high - low > _CLOSE else 0):
         w, slope, bend = math.exp(at), 0.0, 0.0
         for c in range(difference.size):

@@ -46,7 +46,7 @@ def _distance(
     for c in range(scratch.shape[1]):
         scratch[0, c] = ours[0][r, c] - theirs[0][at, c]
         scratch[1, c], scratch[2, c] = max(ours[1][r, c], floor), max(theirs[1][at, c], floor)
-    w = balance(scratch[0], scratch[1], scratch[2])
+    w = balance(scratch[0], scratch[1], scratch[2], w)
     return 4.0 * margin_at(w, scratch[0], scratch[1], scratch[2]) ** 2, w
 
 
@@ -138,7 +138,7 @@ def _polished(
 ) -> tuple[float, float]:
     """Return a squared distance with none smaller around it, and where: Brent's method from x in a range."""
     mean, variance = scratch[4:5], scratch[5:6]
-    w = v = x
+    w, v, of_balance = x, x, 1.0
     fx = fw = fv = np.inf
     step = before = 0.0
     for number in range(_POLISHES):
@@ -160,7 +160,7 @@ def _polished(
                 before, step = step, p / q
             u = x + (step if abs(step) >= close else math.copysign(close, step))
         read_at(u, lamp, lamps, mean, variance, 0)
-        fu, _ = _distance(1.0, floor, ours, r, (mean, variance), 0, np.inf, scratch)
+        fu, of_balance = _distance(of_balance, floor, ours, r, (mean, variance), 0, np.inf, scratch)
         if fu <= fx:
             low, high = (x, high) if u > x else (low, x if u < x else high)
             v, fv, w, fw, x, fx = w, fw, x, fx, u, fu
