@@ -1,7 +1,7 @@
 """Counted work of one design in the scenes of `studies/accuracy.yaml`: `python -m tests.work` keeps it.
 
 Counts do not depend on the machine, unlike seconds: functions of the package that are entered, values that the camera
-reads out, and evaluations of the search of `stopband`.
+reads out, brightness curves that are walked along and followed, and evaluations of the search of `stopband`.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import pytest
 
 from sweep.camera.model import SceneModel
 from sweep.camera.readout import Readout
+from sweep.metrics.brightness import BrightnessCurves
 from sweep.metrics.evaluate import evaluate
 from sweep.search.problem import starting_points
 from sweep.search.solver import search_from
@@ -32,7 +33,7 @@ class Counter:
     """Counts while it is entered."""
 
     def __init__(self) -> None:
-        self.calls = self.values = 0
+        self.calls = self.values = self.walks = self.follows = 0
         self._patch = pytest.MonkeyPatch()
 
     def __enter__(self) -> Counter:
@@ -55,6 +56,8 @@ class Counter:
 
     def _entered(self, frame: FrameType, event: str, _: object) -> None:
         self.calls += event == "call" and frame.f_code.co_filename.startswith(PACKAGE)
+        self.walks += event == "call" and frame.f_code is BrightnessCurves.nearest.__code__
+        self.follows += event == "call" and frame.f_code is BrightnessCurves.follow.__code__
 
 
 def work_of(name: str) -> dict[str, int]:
@@ -66,7 +69,7 @@ def work_of(name: str) -> dict[str, int]:
     evaluate(SceneModel(setup), curves)
     with Counter() as counter:
         evaluate(SceneModel(setup), curves)
-    return {"calls": counter.calls, "values": counter.values}
+    return {what: getattr(counter, what) for what in ("calls", "values", "walks", "follows")}
 
 
 def search_work() -> dict[str, int]:
