@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
@@ -37,8 +37,6 @@ _STEPS = 3
 """Numbers between two neighboring scenarios at which an error that may come back is computed."""
 _NEAR = 2.5
 """Between two scenarios whose d' are both so many times the allowed one, or less, errors are not looked for."""
-_SURE = 1.5
-"""A d' of the lattice of sampling phases that is so many times the allowed one needs no refinement to be larger."""
 _SCHEMA = pa.schema(
     [("design_id", pa.int64())]
     + [(name, pa.string()) for name in ("name", "series", "key", "quantity", "against")]
@@ -149,32 +147,30 @@ class ErrorsBetween:
         of_pairs = [known[pair_name(CHROMATIC_ERROR, pair)] for pair in class_pairs(states)]
         self._quantities = {STATE_ERROR: [known[STATE_ERROR]], CHROMATIC_ERROR: of_pairs}
 
-    def at(self, number: float, quantity: str, *, refined: bool = True) -> float:
-        """Return the error of lamps of equal brightness, or of any; it is no smaller if it is refined."""
-        setup = self._scenes.at(number)
-        if not refined:
-            setup = replace(setup, accuracy=setup.accuracy.model_copy(update={"finest_phase_px": 0.0}))
-        return max(evaluate_some(SceneModel(setup), self._curves, self._quantities[quantity], self._states).values())
+    def at(self, number: float, quantity: str) -> float:
+        """Return the error of lamps of equal brightness, or of any, which is no smaller."""
+        model = SceneModel(self._scenes.at(number))
+        return max(evaluate_some(model, self._curves, self._quantities[quantity], self._states).values())
 
 
 def _of_design(
     errors: ErrorsBetween, known: Mapping[str, Mapping[float, float]], allowed: float
 ) -> list[dict[str, Any]]:
     """Return the crossings of both kinds of errors."""
-    found = []
-    for quantity, numbers in known.items():
-        computed, coarse = (or_nan(partial(errors.at, quantity=quantity, refined=fine)) for fine in (True, False))
-        found += [{"quantity": quantity} | crossing for crossing in crossings_of(computed, coarse, numbers, allowed)]
-    return found
+    return [
+        {"quantity": quantity} | crossing
+        for quantity, numbers in known.items()
+        for crossing in crossings_of(or_nan(partial(errors.at, quantity=quantity)), numbers, allowed)
+    ]
 
 
 def crossings_of(
-    computed: Callable[[float], float], coarse: Callable[[float], float], known: Mapping[float, float], allowed: float
+    computed: Callable[[float], float], known: Mapping[float, float], allowed: float
 ) -> list[dict[str, Any]]:
     """Return the numbers at which an error is the allowed one, in order.
 
-    `known`: errors at the numbers of a series, `computed` between them; `coarse`: errors that are no larger, and take
-    less time. The logarithms of both are nearly on a line between two neighboring ones.
+    `known`: errors at the numbers of a series, `computed` between them. The logarithms of both are nearly on a line
+    between two neighboring ones.
     """
     from scipy.optimize import brentq  # noqa: PLC0415  (few studies ask for it)
     from scipy.special import ndtri  # noqa: PLC0415
@@ -184,14 +180,6 @@ def crossings_of(
     def decades(number: float) -> float:
         error = known[number] if number in known else computed(number)
         return math.log10(max(error, _LEAST) / allowed)
-
-    def rises_above(number: float) -> bool:
-        """Return whether an error is above the allowed one."""
-        if number not in known and coarse(number) > allowed:
-            return True
-        if number not in known and -ndtri(coarse(number)) > -_SURE * ndtri(allowed):
-            return False
-        return decades(number) > 0
 
     def at(position: float) -> float:
         return math.exp(position) if by_ratio else position
@@ -207,9 +195,9 @@ def crossings_of(
         if not passes and (dprimes[:2].min() > _NEAR * dprimes[2] or dprimes[:2].max() * _NEAR < dprimes[2]):
             continue
         grid = [low, *inner_numbers([low, high], _STEPS)[1:-1], high]
-        grid = [number for number in grid if number in known or not math.isnan(coarse(number))]
+        grid = [number for number in grid if not math.isnan(decades(number))]
         for before, after in pairwise(grid):
-            if rises_above(before) == rises_above(after):
+            if (decades(before) <= 0) == (decades(after) <= 0):
                 continue
             ends = (math.log(before), math.log(after)) if by_ratio else (before, after)
             tolerance = _CLOSE * (1.0 if by_ratio else abs(after - before))

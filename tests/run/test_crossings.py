@@ -53,7 +53,7 @@ def test_an_error_that_comes_back_between_two_numbers_is_found() -> None:
 
     known = {number: error(number) for number in (1.0, 2.4, 3.8, 10.0)}
     assert max(known.values()) < 1e-3
-    found = crossings_of(error, error, known, 1e-3)
+    found = crossings_of(error, known, 1e-3)
     assert [row["rises"] for row in found] == [True, False]
     assert [row["at"] for row in found] == pytest.approx([3 * np.exp(-0.2), 3 * np.exp(0.2)], rel=2e-3)
 
