@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -38,16 +39,24 @@ class Counter:
 
     def __enter__(self) -> Counter:
         """Begin to count."""
-        transfer = Readout.transfer
-
-        def counted(readout: Readout, electrons: Any) -> Any:
-            result = transfer(readout, electrons)
-            self.values += int(np.size(result))
-            return result
-
-        self._patch.setattr(Readout, "transfer", counted)
+        self._count(Readout, "transfer", lambda result: self._add("values", int(np.size(result))))
+        self._count(BrightnessCurves, "nearest", lambda _: self._add("walks", 1))
+        self._count(BrightnessCurves, "follow", lambda _: self._add("follows", 1))
         sys.setprofile(self._entered)
         return self
+
+    def _count(self, owner: type, name: str, count: Callable[[Any], None]) -> None:
+        method = getattr(owner, name)
+
+        def counted(*args: Any, **options: Any) -> Any:
+            result = method(*args, **options)
+            count(result)
+            return result
+
+        self._patch.setattr(owner, name, counted)
+
+    def _add(self, what: str, number: int) -> None:
+        setattr(self, what, getattr(self, what) + number)
 
     def __exit__(self, *_: object) -> None:
         """Stop."""
@@ -56,8 +65,6 @@ class Counter:
 
     def _entered(self, frame: FrameType, event: str, _: object) -> None:
         self.calls += event == "call" and frame.f_code.co_filename.startswith(PACKAGE)
-        self.walks += event == "call" and frame.f_code is BrightnessCurves.nearest.__code__
-        self.follows += event == "call" and frame.f_code is BrightnessCurves.follow.__code__
 
 
 def work_of(name: str) -> dict[str, int]:
