@@ -186,7 +186,7 @@ class LampReadings:
         from scipy.interpolate import PchipInterpolator  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
         laws = []
-        for signal, own in enumerate(self.nodes(0.0, np.inf, 2)):
+        for signal, own in enumerate(self._nodes()):
             nodes = np.unique(np.append(0.0, own))
             moments = self.moments(np.array([signal]), nodes[None])
             for mean, variance in zip(moments[0][0].T, moments[1][0].T, strict=True):
@@ -218,18 +218,15 @@ class LampReadings:
         counts, read_e = knees_e * shares, np.array([capture.read_noise_e for capture in pixel.read_as])
         return np.asarray(np.sqrt(counts + read_e**2) / np.maximum(counts, 1e-9) + pixel.prnu, dtype=float)
 
-    def nodes(self, least: float, most: float, steps: int) -> Float[Array, "signals nodes"]:
-        """Return brightnesses between which curves are nearly straight, from dark to all full.
-
-        `least`, `most`: ends of the brightness, relative to that of the scene. `steps`: in the place of each step.
-        """
+    def _nodes(self) -> Float[Array, "signals nodes"]:
+        """Return brightnesses between which curves are nearly straight, from dark to all full."""
         lit_e, dark_e = self.full_e
         weights = self.readout.weights[0]
         seen = weights.max(axis=1) > _SEEN * weights.max()
         lit_e, dark_e = lit_e[:, seen], dark_e[seen]
         brightest_e, of_pixels = np.maximum(lit_e.max(axis=1, keepdims=True), 1e-300), self.light[:, seen]
         knees, around = list[FloatArray](), list[FloatArray]()
-        deviations = np.linspace(-_AROUND_KNEE, _AROUND_KNEE, 4 * _AROUND_KNEE * steps + 1)
+        deviations = np.linspace(-_AROUND_KNEE, _AROUND_KNEE, 4 * _AROUND_KNEE + 1)
         for light, at in groups_of(of_pixels):
             lit = np.maximum(lit_e[:, at], np.maximum(brightest_e / _MOST_RATIO, 1e-30))
             for knee_e, width in zip(knees_of(self.readout.pixel, light), self._knee_widths(light), strict=True):
@@ -243,17 +240,17 @@ class LampReadings:
             parts += [
                 at_knees * (1 - _BESIDE),
                 at_knees * (1 + _BESIDE),
-                _geometric(first, last, _RATIO ** (1 / steps)),
+                _geometric(first, last, _RATIO),
             ]
         elif self.n_pixels <= _FEW:
             parts += [np.concatenate(around, axis=1).reshape(len(lit_e), -1)]
-            parts.append(_geometric(first, last, _RATIO ** (1 / steps)))
+            parts.append(_geometric(first, last, _RATIO))
         else:
             sampled = np.linspace(0, at_knees.shape[1] - 1, min(at_knees.shape[1], _MOST_KNEES)).round().astype(int)
-            parts += [np.sort(at_knees, axis=1)[:, sampled], _geometric(first, last, _RATIO ** (1 / steps))]
+            parts += [np.sort(at_knees, axis=1)[:, sampled], _geometric(first, last, _RATIO)]
             first_full = np.maximum(0.9 * at_knees.min(axis=1, keepdims=True), first)
-            parts.append(_geometric(first_full, last, _RATIO_OF_MANY ** (1 / steps)))
-        return np.sort(np.clip(np.concatenate(parts, axis=1), least, most), axis=1)
+            parts.append(_geometric(first_full, last, _RATIO_OF_MANY))
+        return np.sort(np.concatenate(parts, axis=1), axis=1)
 
 
 def _geometric(

@@ -17,7 +17,7 @@ import numpy as np
 from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int
 from ..camera.brightness import LampReadings
 from ..camera.setup import Setup
-from .discrimination import balance_of
+from .discrimination import balance_of, dprime
 
 LEAST_DN2 = 1e-9
 """Least variance in units of which a distance is taken, DN^2."""
@@ -29,6 +29,8 @@ _POLISHED = 1.01
 """Those up to this times the smallest one are found to rounding."""
 _NONE = 1e-4
 """Distance, in DN or units of the noise, to which a walk proves the smallest one."""
+_WIDER, _FINER, _ROUNDS = 1.12, 13, 3
+"""Ratio of brightnesses beside a known one; numbers between them that are read, again and again."""
 _SCALE_DIGITS, _BESIDE = 12, 1e-5
 _ROOTS = 12
 """Segments of a curve before any is halved."""
@@ -142,6 +144,11 @@ class BrightnessCurves:
         self.unproven += nearest(
             self.lamps.in_kernels, readings, reading, curve, self._starts, roots, least, margin, polished, known, found
         )
+        if self.lamps.proportional:
+            return Nearest(reading, curve, factor, squared)
+        near = squared <= max(margin, _FOLLOWED) * squared.min()  # curves between values are drawn: there read again
+        points = self._followed(Nearest(reading[near], curve[near], factor[near], squared[near]), noise=noise)
+        squared[near], factor[near] = points.squared, points.factor
         return Nearest(reading, curve, factor, squared)
 
     def settled(self, near: Nearest, *, noise: bool) -> Float[Array, " nearest"]:
@@ -183,18 +190,35 @@ class BrightnessCurves:
 
     def follow(self, pairs: Sequence[Nearest], *, noise: bool) -> Float[Array, " cases"]:
         """Return the smallest distance of some pairs in each case, from where their points are known elsewhere."""
-        from .walk_kernels import follow  # noqa: PLC0415  (compiled: kept off the start-up path)
-
         points = []
         for scale, near in zip(self._scale_of_case, pairs, strict=True):
             reading = near.reading + self.lamps.n_signals * scale
             points.append(replace(near, reading=reading, factor=near.factor * self._scales[scale]))
-        found = Nearest.joined(points)
+        return self.of_cases(self._followed(Nearest.joined(points), noise=noise))
+
+    def _followed(self, found: Nearest, *, noise: bool) -> Nearest:
+        """Return points from where brightnesses of a pair are known to where it is nearest."""
         least = self._least_dn2 if noise else 0.0
-        squared, factor = np.empty(found.curve.size), found.factor.copy()
-        pairs_of = self.lamps.in_kernels, self._scales, found.reading, found.curve
-        follow(*pairs_of, *self._range, least, _POLISHED, squared, factor)
-        return self.of_cases(replace(found, squared=squared, factor=factor))
+        if self.lamps.proportional:
+            from .walk_kernels import follow  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+            squared, factor = np.empty(found.curve.size), found.factor.copy()
+            pairs_of = self.lamps.in_kernels, self._scales, found.reading, found.curve
+            follow(*pairs_of, *self._range, least, _POLISHED, squared, factor)
+            return replace(found, squared=squared, factor=factor)
+        scale, signal = np.divmod(found.reading, self.lamps.n_signals)
+        ours, rows = self.lamps.moments(signal, self._scales[scale][:, None]), np.arange(signal.size)
+        low, high = (np.clip(found.factor * times, *self._range) for times in (1 / _WIDER, _WIDER))
+        for _ in range(_ROUNDS):
+            factors = np.linspace(low, high, _FINER, axis=1)
+            theirs = self.lamps.moments(found.curve, factors)
+            spreads = (np.maximum(variance, least) for variance in (ours[1], theirs[1]))
+            apart = ours[0] - theirs[0]
+            squared = dprime(apart, *spreads) ** 2 if noise else (apart**2).sum(axis=-1)
+            at = squared.argmin(axis=1)
+            found = replace(found, squared=squared[rows, at], factor=factors[rows, at])
+            low, high = factors[rows, np.maximum(at - 1, 0)], factors[rows, np.minimum(at + 1, _FINER - 1)]
+        return found
 
 
 def curves_of(lamps: Iterable[LampReadings], setup: Setup) -> list[BrightnessCurves]:

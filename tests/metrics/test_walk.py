@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,11 @@ from sweep.camera.noise.law import pixel_law
 from sweep.camera.noise.law_kernels import largest_variances, slopes_between
 from sweep.camera.noise.merge import light_of
 from sweep.camera.pixel import Pixel
-from sweep.metrics.brightness import BrightnessCurves, curves_of
+from sweep.camera.scene import Scene
+from sweep.metrics.brightness import BrightnessCurves, Walk, curves_of
 from sweep.study import load_study
+
+from .brightness_scan import nearest
 
 STUDIES = Path(__file__).parents[2] / "studies"
 PIXELS: dict[str, dict[str, Any]] = {
@@ -80,3 +84,28 @@ def test_nothing_is_left_unproven(name: str, scenario: str) -> None:
         for noise in (False, True):
             of_cases.nearest(members["yellow"], members["red"], noise=noise, margin=1.1)
         assert of_cases.unproven == 0
+
+
+@pytest.mark.parametrize("merge_rule", ["saturated", "weighted"])
+@pytest.mark.parametrize("noise", [False, True])
+def test_exposures_without_a_fixed_share_of_the_light_are_followed_as_they_read(
+    merge_rule: str, *, noise: bool
+) -> None:
+    """A small photodiode with crosstalk of its own, against a scan."""
+    study = load_study(STUDIES / "hdr.yaml").with_plans()
+    space = next(space for space in study.spaces if space.name == "RGGB")
+    setup = study.setup(space, next(iter(study.scenarios)))
+    captures = ({"well_e": 9000}, {"sensitivity": 0.02, "well_e": 8000, "crosstalk": 0.05})
+    pixel = Pixel(pitch_um=2.8, crosstalk=0.1, captures=captures, merge=merge_rule, offset_dn=64.0, read_noise_e=1.0)
+    target = {"distance_m": 400, "fov_deg": 60, "phase_px": [0.3, 0.1]}
+    scene = Scene.model_validate(setup.scene.model_dump(exclude_none=True) | {"target": target, "intensity_cd": 16.0})
+    setup = replace(setup, scene=scene, left_out=frozenset()).with_camera(pixel=pixel)
+    curves = space.curves(space.points(0, 1), study.grid.size)
+    (lamps,) = scene_model(setup.over_brightness).lamps(curves)
+    assert not lamps.proportional
+    first, second = (np.asarray(setup.members[name])[:5] for name in ("yellow", "red"))
+    (of_case,) = curves_of([lamps], setup)
+    walk = Walk.of([of_case], 1, first, second, noise=noise)
+    expected = nearest(lamps, first, second, noise=noise)[0]
+    assert walk.distances[0] == pytest.approx(expected, rel=1e-5)
+    assert of_case.follow(walk.pairs, noise=noise)[0] == pytest.approx(expected, rel=1e-5)
