@@ -47,7 +47,7 @@ class Capture(Section):
     """Bits of its ADC."""
 
     def __hash__(self) -> int:
-        return hash(self.model_dump_json())
+        return hash((self.sensitivity, self.exposure_ratio, self.start_ratio, self.well_e, self.bits))
 
     @property
     def light(self) -> float:
