@@ -37,6 +37,8 @@ _ROOTS = 12
 _LEAST_E, _MOST_RATIO, _SEEN = 0.5, 1e9, 1e-4
 """Electrons of the brightest pixel at the dimmest end but dark; a pixel that so much more light would not fill, or
 whose weight in a channel is less, relative to the largest, is not waited for."""
+_NO_LIGHT_E = 1e-280
+"""Electrons of a lamp that sends none, so that its brightnesses are numbers."""
 DARK_TO_FULL = (0.0, np.inf)
 """Brightness from no light to where all pixels are full."""
 
@@ -89,7 +91,7 @@ class BrightnessCurves:
         """Brightnesses of each lamp between which curves are walked along."""
         lit, dark, tables, *_, ends, _, _, _, weights, _, _ = self.lamps.in_kernels
         seen = weights.max(axis=1) > _SEEN * weights.max()
-        brightest = np.maximum(lit.max(axis=1, keepdims=True), 1e-300)
+        brightest = np.maximum(lit.max(axis=1, keepdims=True), _NO_LIGHT_E)
         most = np.maximum(ends[tables] - dark, 0.0) / np.maximum(lit, brightest / _MOST_RATIO)
         last = np.maximum(most[:, seen].max(axis=1, keepdims=True), 1e-300)
         first = np.minimum(_LEAST_E / brightest, last / 2)
