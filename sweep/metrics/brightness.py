@@ -27,7 +27,7 @@ _FOLLOWED = 1.1
 """Pairs that come as near as this times the nearest squared distance are looked at in other cases, too."""
 _POLISHED = 1.01
 """Those up to this times the smallest one are found to rounding."""
-_NONE = 1e-4
+NONE = 1e-4
 """Distance, in DN or units of the noise, to which a walk proves the smallest one."""
 _WIDER, _FINER, _ROUNDS = 1.12, 13, 3
 """Ratio of brightnesses beside a known one; numbers between them that are read, again and again."""
@@ -174,13 +174,13 @@ class BrightnessCurves:
         here, beside = slope(factor), slope(factor * (1 + _BESIDE))
         turns = beside - here
         step = np.divide(here, turns, out=np.full_like(here, np.inf), where=turns > 0) * _BESIDE
-        return np.where(np.abs(step) < _BESIDE, factor * (1 - step), factor)
+        return np.asarray(factor * (1 - np.where(np.abs(step) < _BESIDE, step, 0.0)))
 
     def of_cases(self, points: Nearest) -> Float[Array, " cases"]:
         """Return the smallest distance among some points in each case; 0 where no larger one is proven."""
         least = np.full(self._scales.size, np.inf)
         np.minimum.at(least, points.reading // self.lamps.n_signals, points.squared)
-        least[least <= _NONE**2] = 0.0
+        least[least <= NONE**2] = 0.0
         return np.asarray(np.sqrt(least[self._scale_of_case]), dtype=float)
 
     def pairs_of(self, points: Nearest, case: int) -> Nearest:

@@ -19,7 +19,7 @@ from ..base.types import Array, DesignSignals, Float, IndexArray, Int, MemberNum
 from ..camera.brightness import LampSlopes
 from ..camera.noise.law import STEPS_DN2
 from ..spectra.lights import Pair, class_pairs
-from .brightness import BrightnessCurves
+from .brightness import NONE, BrightnessCurves
 from .complex_step import Smooth
 from .discrimination import dprime
 from .separation import MANY, MOST_CHANNELS, packed_response, pair_blocks, pair_order
@@ -175,13 +175,16 @@ def _nearest_rows(
 
     (mean, variance, by_mean, by_variance), (mean_2, variance_2, by_mean_2, by_variance_2) = of_reading, of_curve
     apart = mean - mean_2, by_mean - by_mean_2
-    if not noise:
-        return Rows.of(lambda difference: (difference**2).sum(axis=-1), apart)
-    spreads = [
-        (np.maximum(values, STEPS_DN2), np.where(values > STEPS_DN2, slopes, 0.0))
-        for values, slopes in ((variance, by_variance), (variance_2, by_variance_2))
-    ]
-    return Rows.of(lambda *of: dprime(*of) ** 2, apart, *spreads)
+    if noise:
+        spreads = [
+            (np.maximum(values, STEPS_DN2), np.where(values > STEPS_DN2, slopes, 0.0))
+            for values, slopes in ((variance, by_variance), (variance_2, by_variance_2))
+        ]
+        rows = Rows.of(lambda *of: dprime(*of) ** 2, apart, *spreads)
+    else:
+        rows = Rows.of(lambda difference: (difference**2).sum(axis=-1), apart)
+    far = rows.values > NONE**2
+    return Rows(rows.values * far, rows.by_u * far[:, None])
 
 
 def _closed_rows(design: SmoothDesign, pairs: Sequence[Pair], factors: PerChannel | float) -> Rows:
