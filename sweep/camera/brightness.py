@@ -182,7 +182,7 @@ class LampReadings:
         return cast("Lamps", tuple(arrays))
 
     def _laws_of_brightness(self) -> list[Law]:
-        """Return the law of each channel of each lamp over its brightness, through values at `nodes`."""
+        """Return the law of each channel of each lamp over its brightness, through values at `_nodes`."""
         from scipy.interpolate import PchipInterpolator  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
         laws = []

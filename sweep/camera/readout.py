@@ -86,7 +86,7 @@ class Readout:
             light = self.capture_light_of(electrons)
             return self._merged(electrons, 1)[0] if noisy else merge.without_noise(electrons, light, pixel)
         clips, rounds = setup.computes("saturation"), setup.computes("quantization")
-        if noisy and setup.computes("noise"):
+        if is_noisy(setup):
             return np.asarray(read_once_law(pixel, rounds=rounds).at(0, electrons, 1)[0])
         held = np.minimum(electrons, pixel.saturation_e) if clips else electrons
         if not rounds:

@@ -26,10 +26,10 @@ _FAR = 1.3
 _FOLLOWED = 1.1
 """Pairs that come as near as this times the nearest squared distance are looked at in other cases, too."""
 _POLISHED = 1.01
-"""Those up to this times the smallest one are found to rounding."""
-NONE = 1e-4
-"""Distance, in DN or units of the noise, to which a walk proves the smallest one."""
-_WIDER, _FINER, _ROUNDS = 1.12, 13, 3
+"""Those up to this times the smallest one are polished."""
+EXACT = 1e-4
+"""A walk proves the smallest distance to this share and this many DN, or units of the noise: below, there is none."""
+_AROUND, _FINER, _ROUNDS = 1.12, 13, 3
 """Ratio of brightnesses beside a known one; numbers between them that are read, again and again."""
 _SCALE_DIGITS, _BESIDE = 12, 1e-5
 _ROOTS = 12
@@ -141,11 +141,9 @@ class BrightnessCurves:
         reading = (reading[:, None] + self.lamps.n_signals * np.arange(n_scales)).ravel()
         curve = np.repeat(curve, n_scales)
         squared, factor = np.empty((2, curve.size))
-        least = self._least_dn2 if noise else 0.0
-        readings, roots, found = self._readings, self._roots, (squared, factor)
-        self.unproven += nearest(
-            self.lamps.in_kernels, readings, reading, curve, self._starts, roots, least, margin, polished, known, found
-        )
+        lamps, limits = self.lamps.in_kernels, (self._least_dn2 if noise else 0.0, margin, polished, known, EXACT)
+        walked = self._readings, reading, curve, self._starts, self._roots
+        self.unproven += nearest(lamps, *walked, *limits, (squared, factor))
         if self.lamps.proportional:
             return Nearest(reading, curve, factor, squared)
         near = squared <= max(margin, _FOLLOWED) * squared.min()  # curves between values are drawn: there read again
@@ -156,7 +154,7 @@ class BrightnessCurves:
     def settled(self, near: Nearest, *, noise: bool) -> Float[Array, " nearest"]:
         """Return the brightnesses to more digits than distances tell, by a step of the secant method.
 
-        Brightnesses that would move by more are at an end, and stay.
+        Brightnesses that would move farther than the step are at an end, and stay.
         """
         mean, variance = (values[near.reading] for values in self._readings)
 
@@ -180,7 +178,7 @@ class BrightnessCurves:
         """Return the smallest distance among some points in each case; 0 where no larger one is proven."""
         least = np.full(self._scales.size, np.inf)
         np.minimum.at(least, points.reading // self.lamps.n_signals, points.squared)
-        least[least <= NONE**2] = 0.0
+        least[least <= EXACT**2] = 0.0
         return np.asarray(np.sqrt(least[self._scale_of_case]), dtype=float)
 
     def pairs_of(self, points: Nearest, case: int) -> Nearest:
@@ -210,7 +208,7 @@ class BrightnessCurves:
             return replace(found, squared=squared, factor=factor)
         scale, signal = np.divmod(found.reading, self.lamps.n_signals)
         ours, rows = self.lamps.moments(signal, self._scales[scale][:, None]), np.arange(signal.size)
-        low, high = (np.clip(found.factor * times, *self._range) for times in (1 / _WIDER, _WIDER))
+        low, high = (np.clip(found.factor * times, *self._range) for times in (1 / _AROUND, _AROUND))
         for _ in range(_ROUNDS):
             factors = np.linspace(low, high, _FINER, axis=1)
             theirs = self.lamps.moments(found.curve, factors)
@@ -233,10 +231,10 @@ def curves_of(lamps: Iterable[LampReadings], setup: Setup) -> list[BrightnessCur
 
 @dataclass(frozen=True)
 class Walk:
-    """Smallest distances of two types of lamps of any brightness, in each case; infinite where it is no smallest.
+    """Smallest distances of two types of lamps of any brightness, in each case.
 
-    `pairs`: those that may be nearest in each case, as of `BrightnessCurves.pairs_of`; cases are moments of a place,
-    place by place.
+    Those that are not the smallest of all may be told larger. `pairs`: those that may be nearest in each case, as of
+    `BrightnessCurves.pairs_of`; cases are moments of a place, place by place.
     """
 
     distances: Float[Array, " cases"]

@@ -19,7 +19,7 @@ from ..base.types import Array, DesignSignals, Float, IndexArray, Int, MemberNum
 from ..camera.brightness import LampSlopes
 from ..camera.noise.law import STEPS_DN2
 from ..spectra.lights import Pair, class_pairs
-from .brightness import NONE, BrightnessCurves
+from .brightness import EXACT, BrightnessCurves
 from .complex_step import Smooth
 from .discrimination import dprime
 from .separation import MANY, MOST_CHANNELS, packed_response, pair_blocks, pair_order
@@ -183,7 +183,7 @@ def _nearest_rows(
         rows = Rows.of(lambda *of: dprime(*of) ** 2, apart, *spreads)
     else:
         rows = Rows.of(lambda difference: (difference**2).sum(axis=-1), apart)
-    far = rows.values > NONE**2
+    far = rows.values > EXACT**2
     return Rows(rows.values * far, rows.by_u * far[:, None])
 
 

@@ -1,5 +1,7 @@
 """Compiled walk over brightness: the brightness at which a lamp's reading is nearest to another reading, with a proof.
 
+It holds for readings as the law of the pixel has them (see `camera/noise/law.py`).
+
 Between two brightnesses that are h apart a channel's mean is within (s2 - s)(s - s1) / (s2 - s1) h of its chord of
 slope s, as its slope lies between s1 and s2, and so is its variance; no reading is nearer to the curve than to the
 chord, less that. Distances in units of a noise whose variance is straight are convex along a chord. Segments are halved
@@ -17,11 +19,14 @@ from ..base.types import FloatArray, IndexArray
 from ..camera.noise.law_kernels import Lamps, read_at, slopes_between
 from .margin_kernels import balance, margin_at
 
-_MOST_NODES, _DEPTH = 4000, 80
-_RELATIVE, _ABSOLUTE = 1e-4, 1e-4
-"""A smallest distance is exact to this share, and to this many DN or units of the noise."""
+_MOST_NODES, _DEPTH, _NARROW = 4000, 80, 1e-13
+"""Brightnesses of a lamp, halvings of a segment, and its width relative to its brighter end, from which on it is left
+unproven."""
+_AT_ENDS, _APART = 0.05, 8.0
+"""A segment is divided where its chord is nearest, unless that is so close to an end; in the geometric middle if its
+ends are so many times apart."""
 _NEWTONS, _CLOSE = 4, 1e-3
-_GOLDEN, _POLISHES, _POLISHED = 0.3819660112501051, 40, 1e-7
+_GOLDEN, _POLISHES, _DIGITS = 0.3819660112501051, 40, 1e-7
 _WIDER, _TIMES = 1.12, 40
 """Ratio of brightnesses beside a known one, and how often these are moved to where distances fall."""
 Readings = tuple[FloatArray, FloatArray]
@@ -144,7 +149,7 @@ def _polished(
     for number in range(_POLISHES):
         u = x
         if number:
-            middle, close = 0.5 * (low + high), _POLISHED * x + 1e-300
+            middle, close = 0.5 * (low + high), _DIGITS * x + 1e-300
             if abs(x - middle) <= 2.0 * close - 0.5 * (high - low):
                 break
             p, q, golden = 0.0, 0.0, True
@@ -189,23 +194,23 @@ def _downhill(
 
     No smaller one where it is not below `enough` among the neighbors of the last place.
     """
-    mean, variance, places, found = scratch[4:5], scratch[5:6], np.empty(3), np.full(3, np.nan)
+    mean, variance, places, squared = scratch[4:5], scratch[5:6], np.empty(3), np.full(3, np.nan)
     places[1] = min(max(at, ends[0]), ends[1])
     for _ in range(_TIMES):
         places[0], places[2] = max(places[1] / _WIDER, ends[0]), min(places[1] * _WIDER, ends[1])
         for k in range(3):
-            if math.isnan(found[k]):
+            if math.isnan(squared[k]):
                 read_at(places[k], lamp, lamps, mean, variance, 0)
-                found[k], _ = _distance(1.0, floor, ours, r, (mean, variance), 0, np.inf, scratch)
-        if found[0] < found[1]:
-            places[1], found[1], found[2], found[0] = places[0], found[0], found[1], np.nan
-        elif found[2] < found[1]:
-            places[1], found[1], found[0], found[2] = places[2], found[2], found[1], np.nan
+                squared[k], _ = _distance(1.0, floor, ours, r, (mean, variance), 0, np.inf, scratch)
+        if squared[0] < squared[1]:
+            places[1], squared[1], squared[2], squared[0] = places[0], squared[0], squared[1], np.nan
+        elif squared[2] < squared[1]:
+            places[1], squared[1], squared[0], squared[2] = places[2], squared[2], squared[1], np.nan
         else:
             break
-    if found[1] <= enough and places[2] > places[0]:
+    if squared[1] <= enough and places[2] > places[0]:
         return _polished(places[0], places[1], places[2], lamp, lamps, floor, ours, r, scratch)
-    return found[1], places[1]
+    return squared[1], places[1]
 
 
 @njit(cache=True, nogil=True)
@@ -220,6 +225,7 @@ def nearest(  # noqa: PLR0912, PLR0915  (one walk over curves, readings and segm
     margin: float,
     polished: float,
     known: float,
+    exact: float,
     out: tuple[FloatArray, FloatArray],
 ) -> int:
     """Find for each pair, ordered by curve, the brightness of the lamp whose reading is nearest.
@@ -228,7 +234,8 @@ def nearest(  # noqa: PLR0912, PLR0915  (one walk over curves, readings and segm
     largest variances up to there, row by row; `floor`: least variance, above 0 for distances in units of the noise;
     `out`: squared distances and brightnesses. Pairs that are farther than `margin` times the smallest squared distance
     of all, or than `known`, may be said to be farther than they are; those within `polished` times the smallest are
-    polished. Returns how many segments are left unproven.
+    polished. Distances are told `exact` to this share, and this many DN or units of the noise. Returns how many
+    segments are left unproven.
     """
     n_channels, n_starts, unproven = ours[0].shape[1], starts.shape[1], 0
     (squared, factor), root_mean, root_variance, root_most = out, of_roots[0], of_roots[1], of_roots[2]
@@ -293,7 +300,7 @@ def nearest(  # noqa: PLR0912, PLR0915  (one walk over curves, readings and segm
                         off[at, row, c] = down * up / (down + up) * width if down + up > 0.0 else 0.0
                     most[at, c] = max(tree[1][i, c], tree[1][k, c]) + off[at, 1, c]
                 child[at] = -1
-            enough = math.sqrt(min(squared[q], margin * best, known)) * (1.0 - _RELATIVE) - _ABSOLUTE
+            enough = math.sqrt(min(squared[q], margin * best, known)) * (1.0 - exact) - exact
             if enough <= 0.0 or _is_beyond(floor, ours, r, tree[0], i, k, most, at, off[at], enough * enough):
                 continue
             bound, place = _bound(w, floor, ours, r, tree, i, k, off[at], scratch)
@@ -304,12 +311,12 @@ def nearest(  # noqa: PLR0912, PLR0915  (one walk over curves, readings and segm
                 if here < squared[q]:
                     squared[q], factor[q] = here, na[ends_of[at, end]]
                     best = min(best, here)
-            if depth >= _DEPTH or n_nodes >= _MOST_NODES - 1 or width <= 1e-13 * na[k]:
+            if depth >= _DEPTH or n_nodes >= _MOST_NODES - 1 or width <= _NARROW * na[k]:
                 unproven += 1
                 continue
             if child[at] == -1:
-                a = na[i] + width * (place if 0.05 < place < 0.95 else 0.5)
-                if 0.0 < 8.0 * na[i] < na[k]:
+                a = na[i] + width * (place if _AT_ENDS < place < 1.0 - _AT_ENDS else 0.5)
+                if 0.0 < _APART * na[i] < na[k]:
                     a = math.sqrt(na[i] * na[k])
                 na[n_nodes] = a
                 read_at(a, j, lamps, tree[0], tree[1], n_nodes)

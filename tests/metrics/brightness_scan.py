@@ -1,4 +1,4 @@
-"""Scans of lamps of every brightness, which share no code with the walk along brightness curves."""
+"""Scans of lamps of every brightness: no walk along brightness curves, but readings by the same law of the pixel."""
 
 from __future__ import annotations
 

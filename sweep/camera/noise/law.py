@@ -145,10 +145,8 @@ def read_once_law(pixel: Pixel, *, rounds: bool = True) -> Law:
     """
     from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
-    last_e, rows = (
-        moments.LinearRange.of(pixel).last_e,
-        [moments.ROUNDED if rounds else moments.UNROUNDED, moments.VARIANCE],
-    )
+    rows = [moments.ROUNDED if rounds else moments.UNROUNDED, moments.VARIANCE]
+    last_e = moments.LinearRange.of(pixel).last_e
     if not pixel.prnu:
         spline = moments.table_without_prnu(pixel)
         return _of_roots(CubicSpline(spline.x, spline(spline.x)[rows], axis=1), last_e)
