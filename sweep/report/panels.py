@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT, FONT = 520, 300, 15
 """Of a figure, px, and the size of its letters."""
-_LETTER, _MOST_LETTERS, _TITLE = 8.0, 24, 58
+_LETTER, _BOLD, _MOST_LETTERS, _TITLE = 8.0, 10.5, 24, 58
 """Width of a letter, px, the longest name that is written whole, and the longest title of letters of full size."""
 _APART = 17.0
 """Height of a line of words, px."""
@@ -142,7 +142,8 @@ class Lines(Panel):
     @property
     def room(self) -> float:
         """Width of the names at the ends."""
-        return 12 + _LETTER * max((min(len(name), _MOST_LETTERS) for name in self.lines), default=0)
+        letters = {name: min(len(name), _MOST_LETTERS) for name in self.lines}
+        return 12 + max((n * (_BOLD if name == self.bold else _LETTER) for name, n in letters.items()), default=0.0)
 
     @property
     def y_ticks(self) -> Sequence[tuple[float, str]]:
