@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import Array, Float, IndexArray, Int
+from .axis import Axis
 from .mosaic import Mosaic
-from .refine import Lattice
 from .scene import Target
 from .setup import Setup
 
@@ -132,7 +132,7 @@ def read_at(target: Target, centers_px: Float[Array, "phases 2"]) -> Phases:
     return result
 
 
-def lattice_of(setup: Setup, *, finer: bool) -> Lattice:
+def axis_of(setup: Setup, *, finer: bool) -> Axis:
     """Return the centers of the scene's lattice, or of a finer one, from which extremes are refined.
 
     Where pixels saturate, extremes are kinks, which are missed by slope times step: steps are halved until neighbors
@@ -146,7 +146,7 @@ def lattice_of(setup: Setup, *, finer: bool) -> Lattice:
             break
         steps //= 2
     centers = np.unique(phases.center_px, axis=0)
-    return Lattice(
+    return Axis(
         centers,
         np.full(len(centers), 1 / steps),
         max(0, math.floor(math.log2(1 / (steps * setup.accuracy.finest_phase_px)) + _ROUNDING)),

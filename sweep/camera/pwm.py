@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.types import Array, Float, PerDesign, PerValue
+from .axis import Axis
 from .scene import PwmDrive
 from .setup import Setup
+
+_FINER, _ROUNDS, _ROUNDS_FINER = 8, 3, 4
+"""Factor by which moments of a pulse are finer at one place; rounds around the worst, each so many times finer."""
 
 
 def extremes(drive: PwmDrive, exposure_s: PerDesign) -> tuple[PerDesign, PerDesign]:
@@ -127,3 +131,12 @@ def scales(
     least, most = extremes(drive, exposure_s)
     share = np.linspace(0.0, 1.0, 2 if setup.linear else setup.accuracy.pwm_moments) if moments is None else moments
     return np.asarray(least[:, None] + share * (most - least)[:, None], dtype=float)
+
+
+def moment_axis(setup: Setup, exposure_s: float) -> Axis:
+    """Return the moments of a pulse among which the worst one is sought."""
+    between = _FINER * (setup.accuracy.pwm_moments - 1)
+    moments = np.linspace(0.0, 1.0, between + 1)
+    if setup.camera.pixel.captures:
+        moments = phases_of(setup, np.array([exposure_s]), between)[0]
+    return Axis.along(moments, _ROUNDS, _ROUNDS_FINER)

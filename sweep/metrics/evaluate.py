@@ -82,12 +82,11 @@ def evaluate(
     if can_refine(model.setup):
         wanted_names = frozenset(batch.by_case if refined is None else refined)
         wanted_names |= {name.replace(CHROMATIC_ERROR, CHROMATIC_DPRIME) for name in wanted_names}
-        for sought, of in (
-            (_of_readings(batch, readings, of_readings, wanted_names), model),
-            (_under_noise(batch, others, wanted_names), model),
-            (_of_any_brightness(batch, wanted_names), batch.bright_model),
-        ):
-            refine(sought, of, batch.by_case, batch.columns, quantities)
+        parts = [(sought, model) for sought in _of_readings(batch, readings, of_readings, wanted_names)]
+        parts += [(sought, model) for sought in _under_noise(batch, others, wanted_names)]
+        parts += [(sought, batch.bright_model) for sought in _of_any_brightness(batch, wanted_names)]
+        for sought, of in parts:
+            refine(sought, of, batch.exposure_s, batch.by_case, batch.columns, quantities)
     # Last those of any brightness: their errors are at least those of equal brightness.
     for metric in sorted(others, key=lambda metric: metric.needs == "any brightness"):
         batch.columns |= metric.of_batch(batch)
@@ -101,16 +100,15 @@ def _of_readings(batch: Batch, names: Sequence[str], metrics: Sequence[Metric], 
     def read(design: int, model: SceneModel) -> Columns:
         return _by_case(replace(batch.of(model, design), noisy=False), metrics)
 
-    sought = []
+    designs: dict[tuple[str, ...], list[int]] = {}
     for design in batch.finite if wanted & set(names) else ():
         walked = {
             pair_name(CHROMATIC[kind], pair) for kind in CHROMATIC for pair in batch.walks.get((design, kind), {})
         }
         own = tuple(name for name in names if name in wanted and name not in walked)
-        best = tuple(number for number, name in enumerate(own) if name in csds)
-        if own:
-            sought.append(Sought(design, batch.exposure_s[design], own, partial(read, design), fine=True, best=best))
-    return sought
+        designs.setdefault(own, []).append(design)
+    best = {own: tuple(number for number, name in enumerate(own) if name in csds) for own in designs}
+    return [Sought(tuple(of), own, read, fine=True, best=best[own]) for own, of in designs.items() if own]
 
 
 def _under_noise(batch: Batch, metrics: Sequence[Metric], wanted: Collection[str]) -> list[Sought]:
@@ -124,13 +122,13 @@ def _under_noise(batch: Batch, metrics: Sequence[Metric], wanted: Collection[str
     pairs = class_pairs(list(batch.states))
     known = (*(pair_name(metric, pair) for metric in (D_PRIME, ERROR) for pair in pairs), STATE_ERROR)
     names = tuple(name for name in known if noisy and name in wanted)
-    return [Sought(design, batch.exposure_s[design], names, partial(read, design)) for design in batch.finite if names]
+    return [Sought(tuple(batch.finite), names, read)] if names else []
 
 
 def _of_any_brightness(batch: Batch, wanted: Collection[str]) -> list[Sought]:
     """Return what is sought of each two types of lamps of any brightness in a design, each for itself."""
 
-    def read(design: int, kind: DistanceKind, name: str, walk: Walk, model: SceneModel) -> Columns:
+    def read(kind: DistanceKind, name: str, walk: Walk, design: int, model: SceneModel) -> Columns:
         return {name: batch.followed(model, design, kind, walk)[:, None]}
 
     sought = []
@@ -138,8 +136,7 @@ def _of_any_brightness(batch: Batch, wanted: Collection[str]) -> list[Sought]:
         for pair, walk in walks.items():
             name = pair_name(CHROMATIC[kind], pair)
             if name in wanted and walk.distances.min() > 0:
-                of_pair = partial(read, design, kind, name, walk)
-                sought.append(Sought(design, batch.exposure_s[design], (name,), of_pair))
+                sought.append(Sought((design,), (name,), partial(read, kind, name, walk)))
     return sought
 
 

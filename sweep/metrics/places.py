@@ -7,22 +7,20 @@ those under noise, and those of lamps of any brightness, which cost more, from t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.errors import SweepError, ValidationIssue
-from ..base.types import Array, Float, PerValue, SameShape
+from ..base.types import Array, Bool, BoolArray, Float, PerDesign, SameShape
+from ..camera.axis import Axis, Search
 from ..camera.memory import blocks
 from ..camera.model import SceneModel, View
-from ..camera.phases import lattice_of, phases_at
-from ..camera.pwm import phases_of
-from ..camera.refine import Lattice, in_lockstep, search
+from ..camera.phases import axis_of, phases_at
+from ..camera.pwm import moment_axis
 from ..camera.setup import Setup
 from .quantity import BEST_PHASE, DN, Columns, Quantity
 
-_FINER_MOMENTS, _MOMENT_ROUNDS, _MOMENTS_FINER = 8, 3, 4
-"""Factor by which moments of a pulse are finer at one place; rounds around the worst, each so many times finer."""
 HEIGHT_ROUNDS = 4
 _TOGETHER = 64
 """Designs that are refined side by side."""
@@ -32,24 +30,23 @@ third, relative, of other values."""
 _MOST = 1e300
 """In place of infinity, and of values that are not known at a place, so that differences are numbers."""
 _LARGEST_Z = 40.0
-_Values = Float[Array, "values _places"]
-_Extremes = tuple[PerValue, Float[Array, "values axes"]]
-_At = Callable[[list[int], list[Float[Array, "_places axes"]]], list[_Values]]
+_Places = Float[Array, "places axes"]
+_Asked = Bool[BoolArray, "designs places"]
+_Values = Float[Array, "designs values places"]
 Quantities = Mapping[str, Quantity]
 
 
 @dataclass(frozen=True)
 class Sought:
-    """Columns of a design whose worst values are sought, and how they are read.
+    """Columns of designs whose worst values are sought, and how they are read.
 
-    `read`: from a model to these columns of the design alone in its cases; `fine`: from a finer lattice of phases than
-    the scene's; `best`: numbers of columns whose largest value at a place is sought, too.
+    `read`: from a design and a model to these columns of the design alone in its cases; `fine`: from a finer lattice of
+    phases than the scene's; `best`: numbers of columns whose largest value at a place is sought, too.
     """
 
-    design: int
-    exposure_s: float
+    designs: tuple[int, ...]
     names: tuple[str, ...]
-    read: Callable[[SceneModel], Columns]
+    read: Callable[[int, SceneModel], Columns]
     fine: bool = False
     best: tuple[int, ...] = ()
 
@@ -78,14 +75,15 @@ def can_refine(setup: Setup) -> bool:
 
 
 def refine(
-    sought: Sequence[Sought], model: SceneModel, cases: Columns, columns: Columns, quantities: Quantities
+    sought: Sought, model: SceneModel, exposure_s: PerDesign, cases: Columns, columns: Columns, quantities: Quantities
 ) -> None:
     """Put values refined over phases, field positions and moments into columns, and the largest at a place.
 
     `cases`: columns in the scene's own cases.
     """
-    for start in range(0, len(sought), _TOGETHER):
-        _Refinement(model, sought[start : start + _TOGETHER], cases, quantities).put(columns)
+    for start in range(0, len(sought.designs), _TOGETHER):
+        some = replace(sought, designs=sought.designs[start : start + _TOGETHER])
+        _Refinement(model, some, exposure_s, cases, quantities).put(columns)
 
 
 def oriented(quantity: Quantity, values: SameShape) -> SameShape:
@@ -120,153 +118,136 @@ def bends_over_pulse(setup: Setup) -> bool:
 
 @dataclass(frozen=True)
 class _Refinement:
-    """Values of some designs that are refined side by side."""
+    """Values of some designs that are refined side by side: those sought, then the negatives of the best."""
 
     model: SceneModel
-    group: Sequence[Sought]
+    sought: Sought
+    exposure_s: PerDesign
     cases: Columns
     quantities: Quantities
 
-    def _read(self, design: int, model: SceneModel) -> _Values:
-        of = self.group[design]
-        values = of.read(model)
-        return np.stack([oriented(self.quantities[name], values[name][:, 0]) for name in of.names])
-
-    def _on_lattice(self, design: int) -> _Values:
-        of = self.group[design]
-        return np.stack([oriented(self.quantities[name], self.cases[name][:, of.design]) for name in of.names])
-
     def put(self, columns: Columns) -> None:
         """Put refined values into columns."""
-        model, setup, everything = self.model, self.model.setup, range(len(self.group))
+        model, setup = self.model, self.model.setup
         fine, pulsed = setup.accuracy.finest_phase_px > 0, bends_over_pulse(setup)
         if setup.all_phases and fine:
-            extremes = self._over_phases()
+            axis = axis_of(setup, finer=self.sought.fine)
+            everywhere = np.ones((len(self.sought.designs), len(axis.places)), dtype=bool)
+            known = self._at_phases(axis.places, everywhere) if self.sought.fine else self._on_lattice(axis)
+            values, places = self._searched(axis, known, self._at_phases)
             if pulsed:
-                extremes = [self._pulsed(design, *extremes[design]) for design in everything]
-            self._put(columns, [least for least, _ in extremes], best=True)
+                values = self._at_worst_moments(values, places)
+            self._put(columns, values, best=True)
         elif pulsed and not setup.all_heights:
             own = [*model.own_views()]
-            least = [self._both_ends(design, self._over_pulse(design, own)[:, None])[:, 0] for design in everything]
-            self._put(columns, least, best=model.n_cases == 1)
+            values = np.stack([self._over_pulse(number, own) for number in range(len(self.sought.designs))])
+            self._put(columns, values, best=model.n_cases == 1)
         if setup.all_heights and fine:
-            heights, on_lattice = np.array(model.heights), []
-            for design, of in enumerate(self.group):
-                of_heights = self._on_lattice(design).reshape(len(of.names), heights.size, -1).min(axis=2)
-                on_lattice.append(self._both_ends(design, of_heights))
-            extremes = self._extremes(Lattice.along(heights, HEIGHT_ROUNDS), on_lattice, self._at_heights)
-            self._put(columns, [least for least, _ in extremes], best=model.n_cases == heights.size)
+            heights = np.array(model.heights)
+            known = self._both_ends(self._own().min(axis=(3, 4)))
+            values, _ = self._searched(Axis.along(heights, HEIGHT_ROUNDS), known, self._at_heights)
+            self._put(columns, values, best=model.n_cases == heights.size)
 
-    def _put(self, columns: Columns, extremes: Sequence[PerValue], *, best: bool) -> None:
+    def _put(self, columns: Columns, found: Float[Array, "designs values"], *, best: bool) -> None:
         """Put the smallest of each value, where it is smaller than what is known, and the largest, into the columns."""
-        for of, found in zip(self.group, extremes, strict=True):
-            for name, value in zip(of.names, found[: len(of.names)], strict=True):
-                known = oriented(self.quantities[name], columns[name][of.design : of.design + 1])
-                if value < known[0]:
-                    columns[name][of.design] = _of_oriented(self.quantities[name], float(value))
-            for number, value in zip(of.best, found[len(of.names) :], strict=True):
-                if best:
-                    columns[BEST_PHASE + of.names[number]][of.design] = -value
+        of, n = self.sought, len(self.sought.names)
+        for design, values in zip(of.designs, found.tolist(), strict=True):
+            for name, value in zip(of.names, values, strict=False):
+                if value < oriented(self.quantities[name], columns[name][design : design + 1])[0]:
+                    columns[name][design] = _of_oriented(self.quantities[name], value)
+            for number, value in zip(of.best if best else (), values[n:], strict=False):
+                columns[BEST_PHASE + of.names[number]][design] = -value
 
-    def _both_ends(self, design: int, values: _Values) -> Float[Array, "ends _places"]:
-        return np.concatenate([values, -values[list(self.group[design].best)]])
+    def _read(self, number: int, model: SceneModel) -> Float[Array, "values cases"]:
+        values = self.sought.read(self.sought.designs[number], model)
+        return np.stack([oriented(self.quantities[name], values[name][:, 0]) for name in self.sought.names])
 
-    def _flat(self, design: int, values: _Values) -> PerValue:
-        of, setup = self.group[design], self.model.setup
-        steps = setup.scene.noise is None and setup.computes("quantization")
+    def _both_ends(self, values: Float[Array, "*batch values places"]) -> Float[Array, "*batch ends places"]:
+        return np.concatenate([values, -values[..., list(self.sought.best), :]], axis=-2)
+
+    def _own(self) -> Float[Array, "designs values heights phases moments"]:
+        """Return values in the scene's own cases."""
+        of, model = self.sought, self.model
+        by_name = [oriented(self.quantities[name], self.cases[name][:, list(of.designs)]) for name in of.names]
+        values = np.moveaxis(np.stack(by_name), 2, 0)
+        heights = len(model.heights)
+        return values.reshape(*values.shape[:2], heights, model.n_cases // heights, -1)
+
+    def _searched(
+        self, axis: Axis, known: _Values, at: Callable[[_Places, _Asked], _Values]
+    ) -> tuple[Float[Array, "designs values"], Float[Array, "designs values axes"]]:
+        """Return the smallest values along an axis, and their places."""
+        of, setup = self.sought, self.model.setup
         names = [*of.names, *(of.names[number] for number in of.best)]
-        relative = _FLAT * np.abs(values).min(axis=1)
-        absolute = np.array([_FLAT_DN * (self.quantities[name].unit == DN) for name in names])
+        in_dn = np.array([self.quantities[name].unit == DN for name in names])
+        flat = _FLAT * np.abs(known).min(axis=2)
         if of.fine:
-            absolute = np.where(absolute > 0, _FLAT_STEPS_DN if steps else absolute, relative)
-        return np.asarray(np.maximum(absolute, 0.0 if of.fine else relative), dtype=float)
+            steps = setup.scene.noise is None and setup.computes("quantization")
+            flat = np.where(in_dn, _FLAT_STEPS_DN if steps else _FLAT_DN, flat)
+        else:
+            flat = np.maximum(flat, _FLAT_DN * in_dn)
+        return Search(axis, at, known, flat).run()
 
-    def _extremes(self, lattice: Lattice, on_lattice: Sequence[_Values], at: _At) -> list[_Extremes]:
-        """Return the smallest values, of some the negative of the largest, too, and their places."""
-        searches = [search(lattice, values, self._flat(design, values)) for design, values in enumerate(on_lattice)]
-        return in_lockstep(searches, at)
-
-    def _over_phases(self) -> list[_Extremes]:
-        phases, heights = self.model.phases, len(self.model.heights)
+    def _on_lattice(self, axis: Axis) -> _Values:
+        """Return values at the lattice of the scene; of equally near pixels the smallest."""
+        phases = self.model.phases
         assert phases is not None
-        lattice = lattice_of(self.model.setup, finer=self.group[0].fine)
-        if self.group[0].fine:
-            everything = [*range(len(self.group))]
-            return self._extremes(
-                lattice, self._at_phases(everything, [lattice.places] * len(everything)), self._at_phases
-            )
-        number = {center: at for at, center in enumerate(map(tuple, lattice.places.tolist()))}
-        which = np.array([number[center] for center in map(tuple, phases.center_px.tolist())])
-        on_lattice = []
-        for design, of in enumerate(self.group):
-            of_phases = self._on_lattice(design).reshape(len(of.names), heights, len(phases), -1).min(axis=(1, 3))
-            both = self._both_ends(design, of_phases)
-            least = np.full((len(lattice.places), len(both)), _MOST)
-            np.minimum.at(least, which, both.T)
-            on_lattice.append(least.T)
-        return self._extremes(lattice, on_lattice, self._at_phases)
+        number = {center: at for at, center in enumerate(map(tuple, axis.places.tolist()))}
+        which = [number[center] for center in map(tuple, phases.center_px.tolist())]
+        of_phases = self._both_ends(self._own().min(axis=(2, 4)))
+        least = np.full((*of_phases.shape[:2], len(axis.places)), _MOST)
+        np.minimum.at(np.moveaxis(least, 2, 0), np.array(which), np.moveaxis(of_phases, 2, 0))
+        return least
 
-    def _at_phases(self, designs: list[int], places: list[Float[Array, "_places axes"]]) -> list[_Values]:
-        """Return values of designs at sampling phases, over field positions and moments."""
+    def _at_phases(self, places: _Places, asked: _Asked) -> _Values:
+        """Return values at sampling phases, the smallest over field positions and moments."""
         setup, heights = self.model.setup, len(self.model.heights)
-        centers, which = np.unique(np.concatenate(places), axis=0, return_inverse=True)
-        phases, choices = phases_at(setup, centers)
-        ends = np.cumsum([len(of_design) for of_design in places])
-        numbers_of = np.split(choices[:, which.ravel()], ends[:-1], axis=1)
-        known = [np.full((len(self.group[design].names), len(phases)), np.inf) for design in designs]
+        phases, choices = phases_at(setup, places)
+        values = np.full((len(asked), len(self.sought.names) + len(self.sought.best), len(phases)), np.inf)
         begin = 0
         for block in [phases] if setup.linear else blocks(setup, phases):
             views = [*self.model.views(block)]
-            for row, design in enumerate(designs):
-                wanted = np.unique(numbers_of[row]) - begin
+            for number in np.flatnonzero(asked.any(axis=1)).tolist():
+                wanted = np.unique(choices[:, asked[number]]) - begin
                 wanted = wanted[(wanted >= 0) & (wanted < len(block))]
                 if wanted.size:
-                    values = self._read(design, self.model.at([view.subset(wanted) for view in views]))
-                    of_phases = values.reshape(len(values), heights, wanted.size, -1)
-                    known[row][:, begin + wanted] = of_phases.min(axis=(1, 3))
+                    there = self._read(number, self.model.at([view.subset(wanted) for view in views]))
+                    of_phases = there.reshape(len(there), heights, wanted.size, -1).min(axis=(1, 3))
+                    values[number, :, begin + wanted] = self._both_ends(of_phases).T
             begin += len(block)
-        return [
-            self._both_ends(design, values)[:, numbers].min(axis=1)
-            for design, values, numbers in zip(designs, known, numbers_of, strict=True)
-        ]
+        return np.asarray(values[:, :, choices].min(axis=2))
 
-    def _at_heights(self, designs: list[int], places: list[Float[Array, "_places axes"]]) -> list[_Values]:
-        """Return values of designs at field positions, over phases and moments."""
-        known: dict[tuple[int, float], PerValue] = {}
-        for height in np.unique(np.concatenate(places)).tolist():
+    def _at_heights(self, heights: _Places, asked: _Asked) -> _Values:
+        """Return values at field positions, the smallest over phases and moments."""
+        values = np.full((len(asked), len(self.sought.names) + len(self.sought.best), len(heights)), np.inf)
+        for at, height in enumerate(heights[:, 0].tolist()):
             there = self.model.at([*self.model.views(heights=[height])])
-            for design, of_design in zip(designs, places, strict=True):
-                if height in of_design:
-                    known[design, height] = self._read(design, there).min(axis=1)
-        return [
-            self._both_ends(design, np.stack([known[design, height] for height in of_design[:, 0].tolist()], axis=1))
-            for design, of_design in zip(designs, places, strict=True)
-        ]
+            for number in np.flatnonzero(asked[:, at]).tolist():
+                least = self._read(number, there).min(axis=1)
+                values[number, :, at] = self._both_ends(least[:, None])[:, 0]
+        return values
 
-    def _pulsed(self, design: int, extremes: PerValue, places: Float[Array, "values axes"]) -> _Extremes:
-        """Return extremes at the worst moment of a pulse, at the place of each."""
-        worst, n = extremes.copy(), len(self.group[design].names)
-        distinct, which = np.unique(places, axis=0, return_inverse=True)
-        for number, place in enumerate(distinct):
-            views = [*self.model.views(phases_at(self.model.setup, place[None])[0])]
-            there = self._both_ends(design, self._over_pulse(design, views)[:, None])[:, 0]
-            here = which.ravel() == number
-            worst[:n] = np.where(here[:n], np.minimum(worst[:n], there[:n]), worst[:n])
-            worst[n:] = np.where(here[n:], np.maximum(worst[n:], there[n:]), worst[n:])
-        return worst, places
+    def _at_worst_moments(
+        self, values: Float[Array, "designs values"], places: Float[Array, "designs values axes"]
+    ) -> Float[Array, "designs values"]:
+        """Return values at the worst moment of a pulse, at the place of each."""
+        worst, n = values.copy(), len(self.sought.names)
+        for number, of_values in enumerate(places):
+            distinct, which = np.unique(of_values, axis=0, return_inverse=True)
+            for at, place in enumerate(distinct):
+                views = [*self.model.views(phases_at(self.model.setup, place[None])[0])]
+                there, here = self._over_pulse(number, views), which.ravel() == at
+                worst[number, :n] = np.where(here[:n], np.minimum(values[number, :n], there[:n]), worst[number, :n])
+                worst[number, n:] = np.where(here[n:], np.maximum(values[number, n:], there[n:]), worst[number, n:])
+        return worst
 
-    def _over_pulse(self, design: int, views: Sequence[View]) -> PerValue:
+    def _over_pulse(self, number: int, views: Sequence[View]) -> Float[Array, " values"]:
         """Return the smallest values of one design at any moment of a pulse over some views."""
-        of, setup = self.group[design], self.model.setup
 
-        def at(_: list[int], places: list[Float[Array, "_places axes"]]) -> list[_Values]:
-            moments = places[0][:, 0]
-            values = self._read(design, self.model.at(views, moments))
-            return [values.reshape(len(values), -1, moments.size).min(axis=1)]
+        def at(moments: _Places, _: _Asked) -> _Values:
+            values = self._read(number, self.model.at(views, moments[:, 0]))
+            return np.asarray(values.reshape(1, len(values), -1, len(moments)).min(axis=2))
 
-        finer = _FINER_MOMENTS * (setup.accuracy.pwm_moments - 1)
-        first = np.linspace(0.0, 1.0, finer + 1)
-        if setup.camera.pixel.captures:
-            first = phases_of(setup, np.array([of.exposure_s]), finer)[0]
-        lattice = Lattice.along(first, _MOMENT_ROUNDS, _MOMENTS_FINER)
-        return in_lockstep([search(lattice, at([0], [lattice.places])[0])], at)[0][0]
+        axis = moment_axis(self.model.setup, self.exposure_s[self.sought.designs[number]])
+        least = Search(axis, at, at(axis.places, np.ones((1, len(axis.places)), dtype=bool))).run()[0]
+        return self._both_ends(least[0, :, None])[:, 0]

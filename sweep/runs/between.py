@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..base.types import PerValue
+from ..base.types import Array, Float, PerValue
+from ..camera.axis import Axis, Search
 from ..camera.scene import Scene
 from ..camera.setup import Setup
 from ..study import Study
 
 STEPS = 8
 """Numbers between two neighboring scenarios at which a quantity is computed before its worst one is refined."""
-_STARTS, _ROUNDS, _FINER = 4, 3, 6
-"""Numbers from which the worst is refined, rounds, and steps in each."""
+_STARTS, _ROUNDS, _FINER = 4, 3, 4
+"""Numbers from which the worst is refined, rounds, and how much finer each is."""
 _Path = tuple[str, ...]
 
 
@@ -73,9 +74,13 @@ def _leaves(section: Any, path: _Path = ()) -> Iterator[tuple[_Path, Any]]:
 
 def inner_numbers(numbers: Sequence[float], steps: int = STEPS) -> PerValue:
     """Return numbers with some between each two: of equal ratio where all are above 0, else of equal difference."""
+    fine = _inner_positions(numbers, steps)
+    return np.exp(fine) if min(numbers) > 0 else fine
+
+
+def _inner_positions(numbers: Sequence[float], steps: int) -> PerValue:
     positions = np.log(numbers) if min(numbers) > 0 else np.array(numbers, dtype=float)
-    fine = np.interp(np.arange((len(numbers) - 1) * (steps + 1) + 1) / (steps + 1), np.arange(len(numbers)), positions)
-    return np.asarray(np.exp(fine) if min(numbers) > 0 else fine, dtype=float)
+    return np.interp(np.arange((len(numbers) - 1) * (steps + 1) + 1) / (steps + 1), np.arange(len(numbers)), positions)
 
 
 def minima_between(value: Callable[[float], float], numbers: Sequence[float]) -> list[tuple[float, float]]:
@@ -83,21 +88,24 @@ def minima_between(value: Callable[[float], float], numbers: Sequence[float]) ->
 
     Values may be NaN where there is no scene.
     """
-    grid = inner_numbers(numbers)
-    known = np.nan_to_num([value(number) for number in grid], nan=np.inf)
-    lower = (known <= np.concatenate([[np.inf], known[:-1]])) & (known <= np.concatenate([known[1:], [np.inf]]))
-    lower &= np.isfinite(known)
+
+    def number(position: float) -> float:
+        return float(np.exp(position)) if min(numbers) > 0 else float(position)
+
+    def at(places: Float[Array, "places axes"], _: object = None) -> Float[Array, "designs values places"]:
+        return np.nan_to_num([[[value(number(position)) for position in places[:, 0]]]], nan=np.inf)
+
+    grid = _inner_positions(numbers, STEPS)
+    known = at(grid[:, None])
+    least = known[0, 0]
+    lower = (least <= np.concatenate([[np.inf], least[:-1]])) & (least <= np.concatenate([least[1:], [np.inf]]))
+    lower &= np.isfinite(least)
     minima = []
-    for start in np.flatnonzero(lower)[np.argsort(known[lower], kind="stable")][:_STARTS]:
-        low, high, best = grid[max(start - 1, 0)], grid[min(start + 1, grid.size - 1)], (known[start], grid[start])
-        for _ in range(_ROUNDS):
-            finer = inner_numbers([low, high], _FINER)
-            of_finer = np.nan_to_num([value(number) for number in finer], nan=np.inf)
-            at = int(of_finer.argmin())
-            best = min(best, (of_finer[at], finer[at]))
-            low, high = finer[max(at - 1, 0)], finer[min(at + 1, finer.size - 1)]
-        minima.append((float(best[0]), float(best[1])))
-    return [(number, least) for least, number in sorted(minima)]
+    for start in np.flatnonzero(lower)[np.argsort(least[lower], kind="stable")][:_STARTS]:
+        around = slice(max(start - 1, 0), start + 2)
+        found, place = Search(Axis.along(grid[around], _ROUNDS, _FINER), at, known[..., around]).run()
+        minima.append((float(found[0, 0]), number(place[0, 0, 0])))
+    return [(at_number, of_minimum) for of_minimum, at_number in sorted(minima)]
 
 
 def or_nan(value: Callable[[float], float]) -> Callable[[float], float]:

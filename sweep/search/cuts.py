@@ -13,10 +13,10 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from ..base.types import Array, Float, PerChannel, PerWavelength
+from ..base.types import Array, Bool, BoolArray, Float, PerChannel, PerWavelength
+from ..camera.axis import Axis, Search
 from ..camera.field import field_heights, setup_at
 from ..camera.linear import LinearModel, linear_model
-from ..camera.refine import Lattice, in_lockstep, search
 from ..metrics.members import population_model
 from ..metrics.places import HEIGHT_ROUNDS
 from ..metrics.quantity import DN
@@ -159,15 +159,15 @@ class Heights(Source):
     def nearest(self, name: str, curve: PerWavelength) -> Nearest:
         """Return each two signals at the height at which two of them are nearest."""
 
-        def at(_: list[int], places: list[Float[Array, "_places axes"]]) -> list[Float[Array, "values _places"]]:
+        def at(heights: Float[Array, "places 1"], _: Bool[BoolArray, "1 places"]) -> Float[Array, "1 1 places"]:
             factors = self._factors[name]
-            responses = [self._at(at).smooth(curve[None, None])[0] * factors for at in places[0][:, 0].tolist()]
-            least = [separations(each, self._setup.members)[self._types[name]].min() for each in responses]
-            return [np.array([least])]
+            responses = [self._at(at).smooth(curve[None, None])[0] * factors for at in heights[:, 0].tolist()]
+            return np.array([[[separations(each, self._setup.members)[self._types[name]].min() for each in responses]]])
 
-        lattice = Lattice.along(np.array(self._looked_at), HEIGHT_ROUNDS)
-        ((_, places),) = in_lockstep([search(lattice, at([0], [lattice.places])[0])], at)
-        distances = self._distances(name, float(places[0, 0]))
+        axis = Axis.along(np.array(self._looked_at), HEIGHT_ROUNDS)
+        known = at(axis.places, np.ones((1, len(axis.places)), dtype=bool))
+        _, places = Search(axis, at, known).run()
+        distances = self._distances(name, float(places[0, 0, 0]))
         return distances, distances.produced(curve)
 
 

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from sweep.camera.accuracy import STANDARD
+from sweep.camera.axis import Axis, Search
 from sweep.camera.model import SceneModel
 from sweep.camera.phases import (
+    axis_of,
     different_phases,
-    lattice_of,
     lattice_px,
     read_at,
     scene_phases,
 )
-from sweep.camera.refine import Lattice, in_lockstep, search
 from sweep.camera.setup import READOUT, Setup
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.quantity import BEST_PHASE
@@ -137,10 +137,9 @@ def test_named_and_missing_lights_have_one_phase() -> None:
     assert len(scene_phases(scene("patch", "RGGB", {}).setup)) == 1
 
 
-def refined(lattice: Lattice, value: Callable[[np.ndarray], np.ndarray]) -> float:
+def refined(axis: Axis, value: Callable[[np.ndarray], np.ndarray]) -> float:
     """The smallest value that a search finds."""
-    searches = [search(lattice, value(lattice.places))]
-    return float(in_lockstep(searches, lambda _, places: [value(places[0])])[0][0][0])
+    return float(Search(axis, lambda places, _: value(places)[None], value(axis.places)[None]).run()[0][0, 0])
 
 
 @pytest.mark.parametrize("finest_phase_px", [1 / 8, 1 / 64])
@@ -152,7 +151,7 @@ def test_finer_steps_find_no_worse_an_extreme_of_a_smooth_function(finest_phase_
     def value(centers_px: np.ndarray) -> np.ndarray:
         return 1000 * ((np.mod(centers_px - [0.83, 1.37] + 1, 2) - 1) ** 2).sum(axis=1)[None]
 
-    assert 0 <= refined(lattice_of(setup, finer=True), value) <= 1000 * finest_phase_px**2 / 2 * (1 + 1e-9)
+    assert 0 <= refined(axis_of(setup, finer=True), value) <= 1000 * finest_phase_px**2 / 2 * (1 + 1e-9)
 
 
 def test_a_kink_is_found_as_exactly_as_a_smooth_extreme() -> None:
@@ -163,4 +162,4 @@ def test_a_kink_is_found_as_exactly_as_a_smooth_extreme() -> None:
     def value(centers_px: np.ndarray) -> np.ndarray:
         return 3000 * np.abs(np.mod(centers_px - [0.8337, 1.3713] + 2, 4) - 2).max(axis=1)[None]
 
-    assert refined(lattice_of(setup, finer=True), value) < 0.2
+    assert refined(axis_of(setup, finer=True), value) < 0.2
