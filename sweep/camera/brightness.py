@@ -27,10 +27,9 @@ from ..base.types import (
     PerValue,
 )
 from .effects import any_filter
-from .noise.law import Law, groups_of, knees_of, law_of, pixel_law, same_electrons, stacked, unclipped_e
+from .noise.law import Law, groups_of, knees_of, law_of, pixel_law, stacked, unclipped_e
 from .noise.merge import exposure_of, merged, without_noise
-from .pixel import unquantized
-from .readout import Readout
+from .pixel import Pixel, unquantized
 from .setup import Setup
 
 if TYPE_CHECKING:
@@ -48,8 +47,8 @@ _BESIDE = 1e-9
 """Nodes beside a knee without noise, where the reading may jump, relative."""
 _FEW, _MOST_KNEES = 16, 32
 """Pixels around whose knees nodes are, and knees of many pixels that are nodes."""
-_DIGITS = 10
-"""Digits to which light of pixels is the same."""
+_EQUAL, _DIGITS = 1e-9, 10
+"""Relative difference, and digits, to which light of exposures is the same."""
 _SEEN = 1e-4
 """Weight of a pixel in a channel, relative to the largest, below which its knees are not waited for."""
 _MOST_RATIO = 1e9
@@ -61,7 +60,8 @@ class LampReadings:
     """Electrons of the lamps of a design in one case, and how they are read.
 
     `lit_e` and `dark_e`: electrons of the lamps at the brightness of the scene, and without lamps. `light`: of the
-    exposures on the elements, relative to a pixel of full sensitivity. `readout`: that of the case alone. Pixels with
+    exposures on the elements, relative to a pixel of full sensitivity; `proportional`: all exposures have their fixed
+    share of the electrons. `weights`, `spread_weights`: of elements in mean and variance of the channels. Pixels with
     the same light are one element; `n_pixels` counts all pixels. `cases`: numbers of the cases that differ from this
     one in the brightness of all lamps alone, `scales`.
     """
@@ -69,8 +69,11 @@ class LampReadings:
     lit_e: Float[Array, "captures signals pixels"]
     dark_e: Float[Array, "captures pixels"]
     light: Float[Array, "captures pixels"]
-    readout: Readout
+    weights: Float[Array, "pixels channels"]
+    spread_weights: Float[Array, "pixels channels"]
+    pixel: Pixel
     noisy: bool
+    proportional: bool
     n_pixels: int
     cases: Sequence[int] = (0,)
     scales: Sequence[float] = (1.0,)
@@ -80,16 +83,9 @@ class LampReadings:
         """Number of lamps."""
         return len(self.lit_e[0])
 
-    @cached_property
-    def proportional(self) -> bool:
-        """True if all exposures have their fixed share of the electrons: no pulse, crosstalk or QE tells them apart."""
-        full = [self.lit_e / self.light[:, None], self.dark_e / self.light]
-        return all(same_electrons(of_exposure, knees[0]) for knees in full for of_exposure in knees[1:])
-
     def times(self, factors: PerChannel) -> LampReadings:
         """Return the lamps with each channel's readings multiplied."""
-        weights, spread = self.readout.weights * factors, self.readout.spread_weights * factors**2
-        return replace(self, readout=replace(self.readout, weights=weights, spread_weights=spread))
+        return replace(self, weights=self.weights * factors, spread_weights=self.spread_weights * factors**2)
 
     def of_cases(self) -> list[LampReadings]:
         """Return the lamps of each case."""
@@ -107,8 +103,8 @@ class LampReadings:
         lit_e, dark_e = self.full_e
         full = np.zeros(self.n_signals, dtype=bool)
         for light, at in groups_of(self.light):
-            seen = at[self.readout.weights[0].max(axis=1)[at] > _SEEN * self.readout.weights[0].max()]
-            full |= (lit_e[:, seen] + dark_e[seen] >= knees_of(self.readout.pixel, light)[-1]).any(axis=1)
+            seen = at[self.weights.max(axis=1)[at] > _SEEN * self.weights.max()]
+            full |= (lit_e[:, seen] + dark_e[seen] >= knees_of(self.pixel, light)[-1]).any(axis=1)
         return full
 
     def moments(
@@ -121,18 +117,18 @@ class LampReadings:
         if self.proportional:
             from .noise.law_kernels import read_lamps  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-            mean, variance = np.empty((2, factors.size, self.readout.weights.shape[2]))
+            mean, variance = np.empty((2, factors.size, self.weights.shape[1]))
             read_lamps(self.in_kernels, signals, np.ascontiguousarray(factors, dtype=float), mean, variance)
             return mean.reshape(*factors.shape, -1), variance.reshape(*factors.shape, -1)
         electrons = self.lit_e[:, signals, None] * factors[..., None] + self.dark_e[:, None, None]
-        pixel, light = self.readout.pixel, self.light[:, None, None]
+        pixel, light = self.pixel, self.light[:, None, None]
         if self.noisy:
             values = merged(electrons, light, pixel)
             mean, variance = values.mean, values.variance
         else:
             mean = without_noise(electrons, light, pixel, rounds=False)
             variance = np.zeros(mean.shape)
-        return mean @ self.readout.weights[0], variance @ self.readout.spread_weights[0]
+        return mean @ self.weights, variance @ self.spread_weights
 
     def by_electrons(
         self, signals: Int[IndexArray, " values"], factors: PerValue
@@ -155,13 +151,13 @@ class LampReadings:
         """Return mean and variance of lamps, each at one brightness, and their derivatives by it."""
         mean, variance = (values[:, 0] for values in self.moments(signals, factors[:, None]))
         by_mean, by_variance = (slopes * self.full_e[0][signals] for slopes in self.by_electrons(signals, factors))
-        return mean, variance, by_mean @ self.readout.weights[0], by_variance @ self.readout.spread_weights[0]
+        return mean, variance, by_mean @ self.weights, by_variance @ self.spread_weights
 
     @property
     def law(self) -> tuple[Law, list[tuple[tuple[float, ...], Int[IndexArray, " _"]]]]:
         """Return what pixels read, a table for the light of each group of elements, and these groups."""
         groups = groups_of(self.light)
-        return pixel_law(self.readout.pixel, tuple(light for light, _ in groups), noisy=self.noisy), groups
+        return pixel_law(self.pixel, tuple(light for light, _ in groups), noisy=self.noisy), groups
 
     @cached_property
     def in_kernels(self) -> Lamps:
@@ -171,9 +167,9 @@ class LampReadings:
             tables = np.empty((self.n_signals, dark.size), dtype=np.intp)
             for number, (_, at) in enumerate(groups):
                 tables[:, at] = number
-            weights, squares = self.readout.weights[0], self.readout.spread_weights[0]
+            weights, squares = self.weights, self.spread_weights
         else:
-            law, n = stacked(self._laws_of_brightness()), self.readout.weights.shape[2]
+            law, n = stacked(self._laws_of_brightness()), self.weights.shape[1]
             lit, dark, weights = np.ones((self.n_signals, n)), np.zeros(n), np.eye(n)
             squares, tables = weights, np.arange(self.n_signals * n, dtype=np.intp).reshape(-1, n)
         used = (weights != 0) | (squares != 0)
@@ -200,18 +196,18 @@ class LampReadings:
         `factors`: light of each exposure relative to that of the scene.
         """
         every = np.arange(self.n_signals)
-        if same_electrons(factors, np.broadcast_to(factors[:1], factors.shape)):
+        if np.allclose(factors, factors[:1], _EQUAL, 0.0):
             distinct, which = np.unique(np.round(factors[0], _DIGITS), return_inverse=True)
             means = self.moments(every, np.broadcast_to(distinct, (every.size, distinct.size)))[0]
             return np.moveaxis(means[:, which], 0, 1)
         electrons = self.lit_e[:, None] * factors[:, :, None, None] + self.dark_e[:, None, None]
-        pixel, light = self.readout.pixel, self.light[:, None, None]
+        pixel, light = self.pixel, self.light[:, None, None]
         dn = merged(electrons, light, pixel).mean if self.noisy else without_noise(electrons, light, pixel)
-        return np.asarray(dn @ self.readout.weights[0], dtype=float)
+        return np.asarray(dn @ self.weights, dtype=float)
 
     def _knee_widths(self, light: tuple[float, ...]) -> Float[Array, " knees"]:
         """Return the noise at each knee relative to its electrons; 0 without noise."""
-        pixel = self.readout.pixel
+        pixel = self.pixel
         knees_e, shares = knees_of(pixel, light), [light[at] for at in exposure_of(pixel)]
         if not self.noisy:
             return np.zeros(knees_e.size)
@@ -221,7 +217,7 @@ class LampReadings:
     def _nodes(self) -> Float[Array, "signals nodes"]:
         """Return brightnesses between which curves are nearly straight, from dark to all full."""
         lit_e, dark_e = self.full_e
-        weights = self.readout.weights[0]
+        weights = self.weights
         seen = weights.max(axis=1) > _SEEN * weights.max()
         lit_e, dark_e = lit_e[:, seen], dark_e[seen]
         brightest_e, of_pixels = np.maximum(lit_e.max(axis=1, keepdims=True), 1e-300), self.light[:, seen]
@@ -229,7 +225,7 @@ class LampReadings:
         deviations = np.linspace(-_AROUND_KNEE, _AROUND_KNEE, 4 * _AROUND_KNEE + 1)
         for light, at in groups_of(of_pixels):
             lit = np.maximum(lit_e[:, at], np.maximum(brightest_e / _MOST_RATIO, 1e-30))
-            for knee_e, width in zip(knees_of(self.readout.pixel, light), self._knee_widths(light), strict=True):
+            for knee_e, width in zip(knees_of(self.pixel, light), self._knee_widths(light), strict=True):
                 knees.append(np.maximum(knee_e - dark_e[at], 0.0) / lit)
                 around.append(knees[-1][..., None] * np.maximum(1 + width * deviations, 0.0))
         at_knees = np.concatenate(knees, axis=1)
@@ -260,47 +256,6 @@ def _geometric(
     decades = np.log(np.maximum(last / np.maximum(first, 1e-300), 1.0))
     steps = max(1, int(np.ceil(decades.max() / np.log(ratio))))
     return np.asarray(first * np.exp(decades * np.arange(steps + 1) / steps), dtype=float)
-
-
-Alike = tuple[Int[IndexArray, " groups"], Float[Array, "groups pixels"]]
-"""The first of each group of pixels with the same light, and 1 for the pixels of each group."""
-
-
-def of_case(
-    electrons: Float[Array, "captures signals pixels"],
-    dark: Float[Array, "captures pixels"],
-    readout: Readout,
-    alike: Alike | None,
-    *,
-    noisy: bool,
-) -> LampReadings:
-    """Return the readings of a case from electrons with and without lamps.
-
-    `dark` is `electrons` without lamps; `alike` are the pixels with the same light.
-    """
-    light = readout.capture_light if readout.pixel.captures else np.ones((1, dark.shape[1]))
-    lit, n_pixels = electrons - dark[:, None], dark.shape[1]
-    if alike is not None:
-        first, groups = alike
-        weights, spread_weights = groups @ readout.weights, groups @ readout.spread_weights
-        lit, dark, light = lit[..., first], dark[:, first], light[:, first]
-        readout = replace(readout, weights=weights, spread_weights=spread_weights, capture_light=light)
-    return LampReadings(lit, dark, light, readout, noisy, n_pixels)
-
-
-def alike_pixels(
-    electrons: Float[Array, "captures signals pixels"], dark: Float[Array, "captures pixels"], readout: Readout
-) -> Alike | None:
-    """Return the pixels with the same light, as around a centered lamp; None if all differ."""
-    if dark.shape[1] <= _FEW:
-        return None
-    key = np.concatenate([electrons.sum(axis=1), dark, readout.capture_light])
-    key = np.round(key / np.maximum(key.max(axis=1, keepdims=True), 1e-300), _DIGITS)
-    first, which = np.unique(key, axis=1, return_index=True, return_inverse=True)[1:]
-    which = which.ravel()
-    if first.size == which.size or not same_electrons(electrons, electrons[..., first[which]]):
-        return None
-    return first, (np.arange(first.size)[:, None] == which).astype(float)
 
 
 def room_dn(setup: Setup, response: DesignSignals, unlit: Float[Array, "designs channels"]) -> PerDesign:
@@ -356,12 +311,11 @@ class LampSlopes:
         Float[Array, "free values channels"],
     ]:
         """Return mean and variance of lamps, each at one brightness, and their derivatives."""
-        readout = self.lamps.readout
         mean, variance = (values[:, 0] for values in self.lamps.moments(signals, factors[:, None]))
         by_mean, by_variance = self.lamps.by_electrons(signals, factors)
         by_u = self.lit_by_u[:, signals] * factors[:, None] + self.dark_by_u[:, None]
         mean_by_u, variance_by_u = (
-            (by_mean * by_u) @ readout.weights[0],
-            (by_variance * by_u) @ readout.spread_weights[0],
+            (by_mean * by_u) @ self.lamps.weights,
+            (by_variance * by_u) @ self.lamps.spread_weights,
         )
         return mean, variance, mean_by_u, variance_by_u

@@ -1,118 +1,36 @@
 """Model of a scene: from light to digital numbers, for a batch of designs.
 
-Stages in physical order: optics, pixel aperture and mosaic sampling with crosstalk (`response`), photons to electrons
-(`electrons`), photon noise, full well, read noise, black level, ADC and readout (`readout`). Effects that the setup
-leaves out are not computed. A case is a field position, a sampling phase and a moment of a pulse, in this order.
+Place, light and readout are chosen once (`place`, `light`, `readout`): lamps behind air and lens at an image height,
+their image on the mosaic, electrons of each exposure at each moment of a pulse, digital numbers of pixels, means of
+channels. Effects that the setup leaves out are not computed. A case is a field position, a sampling phase and a moment
+of a pulse, in this order.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
-from ..base.errors import SweepError, ValidationIssue
-from ..base.types import (
-    Array,
-    Bool,
-    BoolArray,
-    DesignCases,
-    DesignCurves,
-    DesignPixels,
-    Float,
-    FloatArray,
-    IndexArray,
-    Int,
-    PerDesign,
-)
+from ..base.types import Array, DesignCases, DesignCurves, Float, FloatArray, PerDesign
 from ..designs.block import Block
-from . import pwm
-from .brightness import LampReadings, alike_pixels, of_case
-from .electrons import Electrons, FieldPosition
+from . import place
+from .along import Along, AlongReadings
+from .brightness import LampReadings
+from .electrons import Dark, Lit, View
 from .exposure import exposure_times, fixed_white, white_irradiance
 from .field import field_heights, scene_at
-from .memory import blocks
+from .light import Steady, alike, different, light_of
 from .phases import Phases, different_phases, scene_phases
 from .pixel import unquantized
-from .readout import NoisyReadout, Readout, is_noisy
-from .response import responses_of, uniform_response
-from .sampling import crosstalk_share
+from .readout import NoisyReadout, exposures_of, is_noisy, readout_of, whole_exposure
 from .setup import Setup
 
 _BLOCK = 2_000_000
-"""Values of a block of pixels that are held at once."""
-_KEPT = 15_000_000
-"""Largest table of one channel's rates in all cases."""
-
-
-@dataclass(frozen=True)
-class View:
-    """Phases of a scene at one field position, and how their electrons are read.
-
-    `exposures`: of each exposure of an HDR pixel, factors on the QE of the channels, and its electrons.
-    """
-
-    electrons: Electrons
-    exposures: tuple[tuple[Float[Array, " channels"], Electrons], ...]
-    readout: Readout
-
-    def subset(self, which: slice | Int[IndexArray, " subset"]) -> View:
-        """Return the view of some phases."""
-        exposures = tuple((factors, electrons.subset(which)) for factors, electrons in self.exposures)
-        return View(self.electrons.subset(which), exposures, self.readout.subset(which))
-
-    def captured(
-        self,
-        curves: DesignCurves,
-        scales: Float[Array, "... designs moments"],
-        exposure_s: PerDesign,
-        *,
-        lit: bool = True,
-    ) -> Float[Array, "*captures designs cases signals pixels"]:
-        """Return expected electrons, or those without lamps; of an HDR pixel of each exposure, on the first axis."""
-
-        def of(electrons: Electrons, curves: DesignCurves, scales: Float[Array, "designs moments"]) -> DesignPixels:
-            return (electrons.expected if lit else electrons.without_lamps)(curves, scales, exposure_s)
-
-        if not self.exposures:
-            return of(self.electrons, curves, scales)
-        camera = self.readout.setup.camera
-        modified, captures = list(camera.modified), [exposure.capture for exposure in camera.pixel.exposures]
-        result, before, read = np.empty(0), None, np.empty(0)
-        for at, ((factors, electrons), scale) in enumerate(zip(self.exposures, scales, strict=True)):
-            if electrons is not before or not np.array_equal(scale, scales[at - 1]):
-                read, before = of(electrons, curves * factors[modified, None], scale), electrons
-            if not at:
-                result = np.empty((len(captures), *read.shape))
-            np.multiply(read, captures[at].light, out=result[at])
-        return result
-
-
-@dataclass(frozen=True)
-class Changing:
-    """Readings of designs that differ in one channel alone.
-
-    `fixed`: DN of the shared channels; those of `channel` are undefined; `make`: from a slice of the designs to DN of
-    that channel; `unlit`: to all channels without the lamps; `exposure_s`: of all of them; `which`: designs of the
-    batch that these are.
-    """
-
-    fixed: Float[Array, "cases signals channels"]
-    channel: int
-    make: Callable[[slice], Float[Array, "_designs cases signals"]]
-    exposure_s: float
-    which: Bool[BoolArray, " designs"]
-    unlit: Callable[[slice], Float[Array, "_designs cases channels"]]
-
-    def whole(self, part: slice) -> DesignCases:
-        """Return all channels of some designs."""
-        values = self.make(part)
-        all_channels = np.repeat(self.fixed[None], len(values), axis=0)
-        all_channels[..., self.channel] = values
-        return all_channels
+"""Values of a block of elements that are held at once."""
 
 
 class SceneModel:
@@ -124,7 +42,9 @@ class SceneModel:
         self.phases: Phases | None = None
         if setup.scene.target is not None:
             self.phases = different_phases(setup, scene_phases(setup))[0]
-        self._positions: dict[tuple[float, int], FieldPosition] = {}
+        self.exposures, self.light, self.readout = exposures_of(setup), light_of(setup), readout_of(setup)
+        self._whole = whole_exposure(setup) if setup.camera.pixel.captures else self.exposures[0]
+        self._positions: dict[float, place.Position] = {}
         self._moments: Float[Array, " moments"] | None = None
         self.n_cases = len(self.heights) * (1 if self.phases is None else len(self.phases))
         """Number of sampling phases times number of field positions."""
@@ -132,15 +52,20 @@ class SceneModel:
     def at(self, views: Sequence[View], moments: Float[Array, " moments"] | None = None) -> SceneModel:
         """Return the model at some views of the scene, and at moments of a pulse instead of those of the accuracy."""
         other = copy(self)
-        other.__dict__.update(_kept=list(views), _along=None)
+        other.__dict__ |= {"own_views": [*views], "_along": None}
         other._moments = moments
-        other.n_cases = sum(view.readout.n_cases for view in views)
+        other.n_cases = sum(view.image.n_cases for view in views)
         return other
 
     @cached_property
-    def _white(self) -> tuple[FloatArray, float]:
-        """Electrons/s on the white patch per unit of QE, and in the brightest channel that no design modifies."""
-        return white_irradiance(self.setup) * self.setup.camera.area_bins_m2_nm, fixed_white(self.setup)
+    def white(self) -> FloatArray:
+        """Electrons/s on the white patch per unit of QE."""
+        return white_irradiance(self.setup) * self.setup.camera.area_bins_m2_nm
+
+    @cached_property
+    def fixed_white(self) -> float:
+        """Electrons/s on the white patch in the brightest channel that no design modifies."""
+        return fixed_white(self.setup)
 
     @property
     def own_moments(self) -> bool:
@@ -149,35 +74,15 @@ class SceneModel:
 
     def exposure_s(self, curves: DesignCurves) -> PerDesign:
         """Return the exposure time of each design."""
-        white, fixed = self._white
-        return exposure_times(self.setup, curves @ white, fixed)
+        return exposure_times(self.setup, curves @ self.white, self.fixed_white)
 
-    @property
-    def white(self) -> FloatArray:
-        """Electrons/s on the white patch per unit of QE."""
-        return self._white[0]
-
-    def position(self, height: float, exposure: int = 0) -> FieldPosition:
-        """Return light and filters at a field position; `exposure`: of an HDR pixel, whose QE and crosstalk count."""
-        key = height, exposure
-        if key not in self._positions:
-            setup = self._exposed[exposure][1] if self._exposed else self.setup
-            scene = setup.scene if setup.scene.field is None else scene_at(setup.scene, height)
-            self._positions[key] = FieldPosition(replace(setup, scene=scene))
-        return self._positions[key]
-
-    @cached_property
-    def _exposed(self) -> list[tuple[Float[Array, " channels"], Setup]]:
-        """QE factors of the channels, and setup, of each exposure of an HDR pixel; first the pixel itself."""
-        camera = self.setup.camera
-        exposed = [(np.ones(len(camera.mosaic.channels)), self.setup)]
-        for exposure in camera.pixel.exposures:
-            capture = exposure.capture
-            factors = np.array([capture.qe_factor.get(channel, 1.0) for channel in camera.mosaic.channels])
-            crosstalk = camera.pixel.crosstalk if capture.crosstalk is None else capture.crosstalk
-            pixel = camera.pixel.model_copy(update={"crosstalk": crosstalk})
-            exposed.append((factors, self.setup.with_camera(qe=camera.qe * factors[:, None], pixel=pixel)))
-        return exposed
+    def position(self, height: float) -> place.Position:
+        """Return lamps and filters at an image height."""
+        if height not in self._positions:
+            scene = self.setup.scene
+            at = self.setup if scene.field is None else replace(self.setup, scene=scene_at(scene, height))
+            self._positions[height] = place.Position(at)
+        return self._positions[height]
 
     def views(
         self,
@@ -193,49 +98,22 @@ class SceneModel:
         """
         by_pixel = not self.setup.linear if by_pixel is None else by_pixel
         phases = self.phases if phases is None else phases
-        parts: list[Phases | None] = [None]
-        if phases is not None:
-            parts = [*blocks(self.setup, phases)] if by_pixel else [phases]
+        if phases is None:
+            images = [place.chart(self.setup, by_pixel=by_pixel)]
+        else:
+            images = place.targets(self.setup, phases, by_pixel=by_pixel)
         for height in self.heights if heights is None else heights:
-            for part in parts:
-                yield self._view(height, part, by_pixel=by_pixel)
-
-    def _view(self, height: float, phases: Phases | None, *, by_pixel: bool) -> View:
-        single = by_pixel and crosstalk_share(self.setup) > 0
-
-        def electrons(exposure: int) -> Electrons:
-            position = self.position(height, exposure)
-            if phases is None:
-                return Electrons(position, uniform_response(position.setup, by_pixel=single))
-            responses = responses_of(position.setup)
-            return Electrons(position, (responses.pixels if by_pixel else responses.channels)(phases))
-
-        of_pixel = electrons(0)
-        exposures = []
-        for number, (factors, setup) in enumerate(self._exposed[1:], 1):
-            same = (factors == 1).all() and setup.camera.pixel.crosstalk == self.setup.camera.pixel.crosstalk
-            exposures.append((factors, of_pixel if same else electrons(number)))
-        return View(of_pixel, tuple(exposures), Readout.of(self.setup, of_pixel.response))
+            for image in images:
+                yield View(self.setup, self.position(height), image)
 
     @cached_property
-    def _kept(self) -> list[View] | None:
-        """Views of the scene's own cases; None if they do not fit into memory together."""
-        fits = self.phases is None or self.setup.linear or len([*blocks(self.setup, self.phases)]) == 1
-        return [*self.views()] if fits else None
+    def own_views(self) -> list[View]:
+        """Views of the scene's own cases."""
+        return [*self.views()]
 
-    def own_views(self) -> Iterator[View]:
-        """Yield the views of the scene's own cases."""
-        return iter(self.views() if self._kept is None else self._kept)
-
-    def scales(self, exposure_s: PerDesign) -> Float[Array, "... designs moments"]:
-        """Return the light relative to its mean at the moments of a pulse, of an HDR pixel for each exposure.
-
-        Those of `at`, or those of the accuracy (see `pwm`).
-        """
-        if self.setup.camera.pixel.captures:
-            scales = pwm.exposure_scales(self.setup, exposure_s, self._moments)
-            return scales[..., np.sort(_different_moments(scales)[0])] if self._moments is None else scales
-        return pwm.scales(self.setup, exposure_s, self._moments)
+    def scales(self, exposure_s: PerDesign) -> Float[Array, "exposures designs moments"]:
+        """Return the light relative to its mean at the moments of a pulse: those of `at`, or of the accuracy."""
+        return self.light.scales(exposure_s, self._moments)
 
     def read(self, curves: DesignCurves) -> tuple[DesignCases, PerDesign]:
         """Read out a batch of designs.
@@ -244,12 +122,14 @@ class SceneModel:
         """
         exposure_s = self.exposure_s(curves)
         scales = self.scales(exposure_s)
-        first, which = _different_moments(scales)
-        scales = scales[..., first]
+        first, which = different(scales)
         parts = []
-        for view in self.own_views():
-            electrons = self._blocks(view, curves, scales, exposure_s)
-            parts.append(np.concatenate([view.readout.folded(view.readout.transfer(of_some)) for of_some in electrons]))
+        for view in self.own_views:
+            light, blocks = (
+                view.capture_light(self.exposures),
+                self._blocks(view, curves, scales[..., first], exposure_s),
+            )
+            parts.append(_by_design([view.image.folded(self.readout.mean(each, light)) for each in blocks]))
         dn = np.concatenate(parts, axis=1)
         return dn[:, np.arange(dn.shape[1]).reshape(-1, first.size)[:, which].ravel()], exposure_s
 
@@ -259,81 +139,63 @@ class SceneModel:
         Pixels are read one by one: saturation and quantization must be computed.
         """
         exposure_s = self.exposure_s(curves)
-        scales = self.scales(exposure_s)
-        parts = []
-        for view in self.own_views():
-            read = [view.readout.with_noise(e) for e in self._blocks(view, curves, scales, exposure_s)]
-            parts.append([np.concatenate(values) for values in zip(*read, strict=True)])
-        mean, variance = (np.concatenate(values, axis=1) for values in zip(*parts, strict=True))
-        return NoisyReadout(mean, variance, exposure_s)
+        scales, means, variances = self.scales(exposure_s), [], []
+        for view in self.own_views:
+            light, read = view.capture_light(self.exposures), []
+            for electrons in self._blocks(view, curves, scales, exposure_s):
+                mean, variance = self.readout.moments(electrons, light)
+                read.append((view.image.folded(mean), view.image.spread(variance)))
+            means.append(_by_design([mean for mean, _ in read]))
+            variances.append(_by_design([variance for _, variance in read]))
+        return NoisyReadout(np.concatenate(means, axis=1), np.concatenate(variances, axis=1), exposure_s)
 
     def _blocks(
-        self, view: View, curves: DesignCurves, scales: Float[Array, "... designs moments"], exposure_s: PerDesign
-    ) -> Iterator[Float[Array, "... cases signals pixels"]]:
+        self, view: View, curves: DesignCurves, scales: Float[Array, "exposures designs moments"], exposure_s: PerDesign
+    ) -> Iterator[Float[Array, "exposures elements _designs moments signals"]]:
         """Yield expected electrons of blocks of designs."""
-        size = np.prod(view.electrons.response.shape) * scales.shape[-1] * len(self.setup.lights.names)
-        step = max(1, _BLOCK // int(size))
+        size = view.image.channel.size * scales.shape[2] * len(self.setup.lights.names)
+        step = max(1, _BLOCK // size)
         for start in range(0, len(curves), step):
             block = slice(start, start + step)
-            yield view.captured(curves[block], scales[..., block, :], exposure_s[block])
+            lit, dark = self._electrons(view, curves[block], exposure_s[block])
+            yield lit[:, :, :, None] * scales[:, None, block, :, None] + dark[..., None, None]
+
+    def _electrons(
+        self, view: View, curves: DesignCurves, exposure_s: PerDesign
+    ) -> tuple[Float[Array, "exposures elements designs signals"], Float[Array, "exposures elements designs"]]:
+        """Return expected electrons of the lamps with the mean light of their pulses, and without lamps."""
+        parts = list[tuple[Lit, Dark]]()
+        for at, exposure in enumerate(self.exposures):
+            same = next((of for of in range(at) if exposure.same_rates(self.exposures[of])), None)
+            rates = view.rates(curves, exposure) if same is None else parts[same]
+            parts.append(rates)
+        light = np.array([exposure.light for exposure in self.exposures])
+        times = light[:, None] * exposure_s
+        lit, dark = (np.stack(rates) for rates in zip(*parts, strict=True))
+        lit *= times[:, None, :, None]
+        dark *= times[:, None]
+        return lit, dark
+
+    def along(self, block: Block) -> AlongReadings | None:
+        """Read designs that differ in one channel alone; those whose modified channel sets the exposure are left out.
+
+        None if the designs differ in more, or if the scene has no such way.
+        """
+        return None if self._along is None else self._along.read(block)
+
+    @cached_property
+    def _along(self) -> Along | None:
+        fast = isinstance(self.light, Steady) and Along.applies(self.setup, self.own_views)
+        return Along(self.own_views, self.exposures[0], self.readout, self.white, self.fixed_white) if fast else None
 
     def unlit(self, curves: DesignCurves, exposure_s: PerDesign) -> Float[Array, "designs cases channels"]:
         """Return the response without the lamps: black level, dark current and background, unquantized, DN."""
         parts = []
-        for view in self.own_views():
-            electrons = view.electrons.unlit(curves) * exposure_s[:, None, None]
-            parts.append(view.readout.folded(unquantized(electrons, view.readout.pixel)[:, :, None])[:, :, 0])
-        return np.repeat(np.concatenate(parts, axis=1), self.scales(exposure_s).shape[-1], axis=1)
-
-    def changing(self, block: Block) -> Changing | None:
-        """Read designs that differ in one channel alone; those whose modified channel sets the exposure are left out.
-
-        None if the designs differ in more, if a channel is read from several elements, or if the light is pulsed.
-        """
-        setup, views = self.setup, self._kept
-        if setup.camera.pixel.captures or len(setup.camera.modified) != 1 or views is None:
-            return None
-        columns = [view.electrons for view in views]
-        if any(electrons.one_element is None for electrons in columns) or self._along is None:
-            return None
-        products = block.product(self._along, np.arange(setup.camera.grid.size))
-        white, *of_views = np.split(products, np.cumsum([1, *(e.along.shape[1] for e in columns[:-1])]), axis=1)
-        time_s = exposure_times(setup, np.zeros((1, 1)), self._white[1])
-        which = np.ones(len(block), dtype=bool)
-        if white.max(initial=0.0) > self._white[1]:
-            which = exposure_times(setup, white, self._white[1]) == time_s
-        if not which.any() or not np.isfinite(time_s[0]) or self.scales(time_s).shape[1] > 1:
-            return None
-        if not which.all():
-            of_views = [of_view[which] for of_view in of_views]
-        rates_of, channel = [*zip(columns, of_views, strict=True)], int(columns[0].one_element or 0)
-        readout = views[0].readout
-        nothing = np.zeros((1, *setup.camera.base_qe.shape))
-        dark = [electrons.unlit(nothing)[0] for electrons in columns]
-        rest = [electrons.fixed + unlit[:, None] for electrons, unlit in zip(columns, dark, strict=True)]
-        exposure_s, dark_e = float(time_s[0]), np.concatenate(dark) * time_s[0]
-
-        def make(part: slice) -> Float[Array, "_designs cases signals"]:
-            electrons = [of.expected_along(rates[part], exposure_s) for of, rates in rates_of]
-            return readout.transfer(electrons[0] if len(rates_of) == 1 else np.concatenate(electrons, axis=1))
-
-        def unlit(part: slice) -> Float[Array, "designs cases channels"]:
-            of_channel = np.concatenate([of.unlit_along(rates[part]) for of, rates in rates_of], axis=1)
-            electrons = np.repeat(dark_e[None], len(of_channel), axis=0)
-            electrons[..., channel] = of_channel * exposure_s
-            return unquantized(electrons, readout.pixel)
-
-        fixed = readout.transfer(np.concatenate(rest) * time_s[0])
-        return Changing(fixed, channel, make, exposure_s, which, unlit)
-
-    @cached_property
-    def _along(self) -> FloatArray | None:
-        """Weights of the one modified channel: white, then what its electrons need in each view; None if too many."""
-        columns = [view.electrons for view in self._kept or ()]
-        signals, size = len(self.setup.lights.names), self.setup.camera.grid.size
-        if sum(electrons.response.shape[0] for electrons in columns) * signals * size > _KEPT:
-            return None
-        return np.concatenate([self._white[0][:, None], *(electrons.along for electrons in columns)], axis=1)
+        for view in self.own_views:
+            rates = view.rates(curves, self._whole)[1]
+            parts.append(view.image.folded(unquantized(rates * exposure_s, self.setup.camera.pixel)))
+        unlit = np.moveaxis(np.concatenate(parts), 2, 0)
+        return np.repeat(unlit, self.scales(exposure_s).shape[-1], axis=1)
 
     def lamps(self, curves: DesignCurves) -> Iterator[LampReadings]:
         """Yield the readings of one design's lamps over their brightness; `curves` as of `read`.
@@ -341,72 +203,34 @@ class SceneModel:
         Cases whose lamps differ in brightness alone, as the moments of a pulse, are one.
         """
         exposure_s = self.exposure_s(curves)
-        scales = self.scales(exposure_s)
-        moments, case = _alike_moments(scales), 0
-        different = scales[..., [of_moments[0] for of_moments, _ in moments]]
-        for view in self.own_views():
-            electrons = view.captured(curves, different, exposure_s)
-            dark = view.captured(curves, different, exposure_s, lit=False)
-            if not self.setup.camera.pixel.captures:
-                electrons, dark = electrons[None], dark[None]
-            for phase in range(electrons.shape[2] // len(moments)):
-                readout = view.readout.subset(slice(phase, phase + 1))
-                part = slice(phase * len(moments), (phase + 1) * len(moments))
-                lit, unlit = electrons[:, 0, part], dark[:, 0, part, 0]
-                alike = alike_pixels(lit.sum(axis=1), unlit.sum(axis=1), readout)  # at every moment of a pulse
-                for at, (numbers, of_scale) in enumerate(moments):
+        scales, case = self.scales(exposure_s), 0
+        moments, readout, noisy = alike(scales), self.readout, is_noisy(self.setup)
+        for view in self.own_views:
+            light, (lit, dark) = view.capture_light(self.exposures), self._electrons(view, curves, exposure_s)
+            lit_e, dark_e = np.swapaxes(lit[:, :, 0], 1, 2), dark[..., 0]
+            for of_case in range(view.image.n_cases):
+                used, weights, spread, n_pixels = view.image.of_case(of_case)
+                lit_here, dark_here, light_here = lit_e[..., used], dark_e[:, used], light[:, used]
+                for numbers, factors in moments:
+                    then_e = lit_here * scales[:, 0, numbers[0], None, None]
                     cases = [case + number for number in numbers]
-                    of_cases = of_case(lit[:, at], unlit[:, at], readout, alike, noisy=is_noisy(self.setup))
-                    yield replace(of_cases, cases=cases, scales=of_scale)
+                    elements = then_e, dark_here, light_here, weights, spread
+                    yield LampReadings(*elements, readout.pixel, noisy, readout.proportional, n_pixels, cases, factors)
                 case += scales.shape[-1]
 
-    def pixel_electrons(self, curves: DesignCurves) -> Float[Array, "*captures designs cases signals pixels"]:
-        """Return expected electrons of the pixels that are read.
-
-        For a patch that fills the field, the pixels of one tile, row by row. Of an HDR pixel those of each exposure, on
-        the first axis. Raises SweepError if the pixels of all phases do not fit into memory.
-        """
-        if self._kept is None:
-            raise too_many(self, "too many pixels to draw")
+    def pixel_electrons(self, curves: DesignCurves) -> Float[Array, "exposures designs cases signals elements"]:
+        """Return expected electrons of the elements in each case of a light that fills the field."""
         exposure_s = self.exposure_s(curves)
         scales = self.scales(exposure_s)
-        parts = [view.readout.of_pixels(view.captured(curves, scales, exposure_s)) for view in self._kept]
-        return np.concatenate(parts, axis=-3)
-
-    @property
-    def readout(self) -> Readout:
-        """Readout of the scene's first cases."""
-        return next(self.own_views()).readout
+        parts = [np.concatenate([*self._blocks(view, curves, scales, exposure_s)], axis=2) for view in self.own_views]
+        return np.concatenate([np.moveaxis(part, 1, -1) for part in parts], axis=2)
 
 
-def too_many(model: SceneModel, problem: str) -> SweepError:
-    """Return the error of a scene whose single pixels do not fit into memory together."""
-    assert model.phases is not None
-    first = next(iter(blocks(model.setup, model.phases)))
-    most = f"at most those of {len(first)} sampling phases: a smaller light, or a named phase"
-    return SweepError(ValidationIssue(problem, value=f"{model.n_cases} phases", allowed=most))
-
-
-def _different_moments(
-    scales: Float[Array, "... designs moments"],
-) -> tuple[Int[IndexArray, " different"], Int[IndexArray, " moments"]]:
-    """Return the first moment of each light in all designs and exposures, and which of these each moment has."""
-    flat = np.round(scales.reshape(-1, scales.shape[-1]), 12)
-    _, first, which = np.unique(flat, axis=1, return_index=True, return_inverse=True)
-    return first, which.ravel()
-
-
-def _alike_moments(scales: Float[Array, "... 1 moments"]) -> list[tuple[list[int], list[float]]]:
-    """Return groups of moments whose light differs by one factor in all exposures: brightest first, and the factors."""
-    columns = scales.reshape(-1, scales.shape[-1])
-    most = columns.max(axis=0)
-    kinds = np.round(columns / np.maximum(most, 1e-300), 12).T.tolist()
-    groups: dict[tuple[float, ...], list[int]] = {}
-    brightest = np.argsort(-most, kind="stable").tolist()
-    for moment in brightest:
-        lit = most[moment] > 0 or not groups
-        groups.setdefault(tuple(kinds[moment]) if lit else next(iter(groups)), []).append(moment)
-    return [(numbers, (most[numbers] / (most[numbers[0]] or 1.0)).tolist()) for numbers in groups.values()]
+def _by_design(blocks: Sequence[Float[Array, "_places channels _designs moments signals"]]) -> DesignCases:
+    """Return digital numbers of blocks of designs in the order of designs, cases, signals and channels."""
+    folded = np.concatenate(blocks, axis=2)
+    ordered = np.transpose(folded, (2, 0, 3, 4, 1))
+    return np.ascontiguousarray(ordered.reshape(len(ordered), -1, *ordered.shape[3:]))
 
 
 @lru_cache(maxsize=8)

@@ -5,12 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.types import Array, Float, PerDesign, PerValue
-from .axis import Axis
 from .scene import PwmDrive
 from .setup import Setup
-
-_FINER, _ROUNDS, _ROUNDS_FINER = 8, 3, 4
-"""Factor by which moments of a pulse are finer at one place; rounds around the worst, each so many times finer."""
 
 
 def extremes(drive: PwmDrive, exposure_s: PerDesign) -> tuple[PerDesign, PerDesign]:
@@ -98,45 +94,13 @@ def phases_of(setup: Setup, exposure_s: PerDesign, between: int) -> Float[Array,
 
 
 def exposure_scales(
-    setup: Setup, exposure_s: PerDesign, moments: Float[Array, " moments"] | None = None
-) -> Float[Array, "captures designs moments"]:
+    setup: Setup, exposure_s: PerDesign, phases: Float[Array, "designs phases"]
+) -> Float[Array, "exposures designs phases"]:
     """Return the light in each exposure of an HDR pixel relative to its mean, at phases of the pulse.
 
-    `setup`: drive, pixel and accuracy; `moments`: phases, in periods, instead of those of the accuracy.
+    `setup`: drive and pixel; `phases`: start of the first exposure after the start of a pulse, periods.
     """
     drive = setup.scene.drive
-    if drive is None or not setup.computes("flicker"):
-        return np.ones((len(setup.camera.pixel.exposures), len(exposure_s), 1))
+    assert drive is not None
     starts, lengths = _windows(setup, exposure_s)
-    if moments is None:
-        phases = phases_of(setup, exposure_s, setup.accuracy.pwm_moments - 2)
-    else:
-        phases = np.broadcast_to(moments, (len(exposure_s), moments.size))
     return light_in(drive, phases + starts[:, :, None], lengths[:, :, None])
-
-
-def scales(
-    setup: Setup, exposure_s: PerDesign, moments: Float[Array, " moments"] | None = None
-) -> Float[Array, "designs moments"]:
-    """Return the light relative to its mean at the moments that are computed.
-
-    Behind a linear readout the extremes are at the two ends. Behind a nonlinear one the distance of two signals may be
-    smallest at any moment between them.
-
-    `moments`: moments from 0 (least light) to 1 (most light), instead of those of the accuracy.
-    """
-    drive = setup.scene.drive
-    if drive is None or not setup.computes("flicker"):
-        return np.ones((len(exposure_s), 1))
-    least, most = extremes(drive, exposure_s)
-    share = np.linspace(0.0, 1.0, 2 if setup.linear else setup.accuracy.pwm_moments) if moments is None else moments
-    return np.asarray(least[:, None] + share * (most - least)[:, None], dtype=float)
-
-
-def moment_axis(setup: Setup, exposure_s: float) -> Axis:
-    """Return the moments of a pulse among which the worst one is sought."""
-    between = _FINER * (setup.accuracy.pwm_moments - 1)
-    moments = np.linspace(0.0, 1.0, between + 1)
-    if setup.camera.pixel.captures:
-        moments = phases_of(setup, np.array([exposure_s]), between)[0]
-    return Axis.along(moments, _ROUNDS, _ROUNDS_FINER)

@@ -1,23 +1,63 @@
-"""Readout of a scene: from expected electrons through full well, noise and ADC to digital numbers of the channels.
-
-A channel is the mean over the disc, or the demosaicked center.
-"""
+"""Readout of a pixel: from expected electrons through full well, noise and ADC to digital numbers."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import Array, DesignCases, DesignPixels, Float, IndexArray, Int, PerDesign
+from ..base.types import Array, Float, PerChannel, PerDesign, SameShape
 from .noise import merge
-from .noise.law import groups_of, pixel_law, read_once_law, same_electrons
+from .noise.law import groups_of, pixel_law, read_once_law
 from .noise.rounding import rounded
 from .pixel import Pixel, unquantized
-from .response import PixelResponse
+from .sampling import crosstalk_share
 from .setup import Setup
 
 _CERTAIN_DN2 = 1e-9
+Electrons = Float[Array, "exposures elements *batch"]
+"""Expected electrons in each exposure of a pixel; one that is read once has one."""
+CaptureLight = Float[Array, "exposures elements"]
+"""Light of the exposures of elements, relative to a pixel of full sensitivity."""
+Numbers = Float[Array, "elements *batch"]
+"""Digital numbers of elements, DN, or their variances, DN^2."""
+
+
+@dataclass(frozen=True, eq=False)
+class Exposure:
+    """Electrons that a pixel collects at a time.
+
+    `light`: relative to a pixel of full sensitivity in the scene's exposure time; `factors`: on the QE of the channels.
+    """
+
+    light: float
+    factors: PerChannel
+    crosstalk: float
+
+    @property
+    def plain(self) -> bool:
+        """True if the QE is that of the pixel."""
+        return bool((self.factors == 1).all())
+
+    def same_rates(self, other: Exposure) -> bool:
+        """Return whether electrons/s are those of another exposure, but for the sensitivity."""
+        return self.crosstalk == other.crosstalk and bool((self.factors == other.factors).all())
+
+
+def whole_exposure(setup: Setup) -> Exposure:
+    """Return the exposure of a pixel of full sensitivity."""
+    return Exposure(1.0, np.ones(len(setup.camera.mosaic.channels)), crosstalk_share(setup))
+
+
+def exposures_of(setup: Setup) -> list[Exposure]:
+    """Return the exposures of a scene's pixel."""
+    whole, channels, exposures = whole_exposure(setup), setup.camera.mosaic.channels, []
+    for capture, _ in setup.camera.pixel.exposures:
+        factors = np.array([capture.qe_factor.get(channel, 1.0) for channel in channels])
+        crosstalk = whole.crosstalk if capture.crosstalk is None else capture.crosstalk
+        exposures.append(Exposure(capture.light, factors, crosstalk if whole.crosstalk else 0.0))
+    return exposures or [whole]
 
 
 @dataclass(frozen=True)
@@ -27,140 +67,111 @@ class NoisyReadout:
     `mean`, `variance`: mean, DN, and variance, DN^2, of each channel.
     """
 
-    mean: DesignCases
-    variance: DesignCases
+    mean: Float[Array, "designs cases signals channels"]
+    variance: Float[Array, "designs cases signals channels"]
     exposure_s: PerDesign
 
 
-def capture_light(setup: Setup, response: PixelResponse) -> Float[Array, "captures pixels"]:
-    """Return the light of each exposure of an HDR pixel relative to that of a pixel of full sensitivity."""
-    channels = setup.camera.mosaic.channels
-    of_element = [channels[at] for at in response.readout.max(axis=0).argmax(axis=1)]
-    captures = [exposure.capture for exposure in setup.camera.pixel.exposures]
-    light = [[capture.light * capture.qe_factor.get(channel, 1.0) for channel in of_element] for capture in captures]
-    return np.array(light, dtype=float).reshape(len(captures), len(of_element))
-
-
 @dataclass(frozen=True)
-class Readout:
-    """Readout of the elements of a pixel response.
+class ReadOnce:
+    """A pixel that is read once; `convert`: from its electrons to digital numbers, under noise to their means."""
 
-    `weights`, `spread_weights`: of each element in the value of each channel and in its variance; `capture_light`:
-    light of the exposures of an HDR pixel on the elements.
-    """
+    pixel: Pixel
+    convert: Callable[[SameShape], SameShape]
+    proportional = True
 
-    setup: Setup
-    weights: Float[Array, "cases pixels channels"]
-    spread_weights: Float[Array, "cases pixels channels"]
-    capture_light: Float[Array, "captures pixels"]
-    by_channel: bool
+    def mean(self, electrons: Electrons, light: CaptureLight) -> Numbers:  # noqa: ARG002
+        """Return digital numbers; under noise their means."""
+        return self.convert(electrons[0])
 
-    @classmethod
-    def of(cls, setup: Setup, response: PixelResponse) -> Readout:
-        """Return the readout of a response."""
-        light = capture_light(setup, response)
-        return cls(setup, response.readout, response.spread, light, response.by_channel)
-
-    def subset(self, which: slice | Int[IndexArray, " subset"]) -> Readout:
-        """Return the readout at some sampling phases."""
-        return replace(self, weights=self.weights[which], spread_weights=self.spread_weights[which])
-
-    @property
-    def pixel(self) -> Pixel:
-        """The pixel that is read."""
-        return self.setup.camera.pixel
-
-    @property
-    def n_cases(self) -> int:
-        """Number of sampling phases."""
-        return len(self.weights)
-
-    def transfer(self, electrons: Float[Array, "... pixels"]) -> Float[Array, "... pixels"]:
-        """Convert expected electrons to digital numbers; under noise, to their means, DN.
-
-        `electrons`: expected electrons of the elements; of an HDR pixel those of each exposure, on the first axis.
-        """
-        setup, pixel = self.setup, self.pixel
-        noisy = setup.scene.noise is not None
-        if pixel.captures:
-            light = self.capture_light_of(electrons)
-            return self._merged(electrons, 1)[0] if noisy else merge.without_noise(electrons, light, pixel)
-        clips, rounds = setup.computes("saturation"), setup.computes("quantization")
-        if is_noisy(setup):
-            return np.asarray(read_once_law(pixel, rounds=rounds).at(0, electrons, 1)[0])
-        held = np.minimum(electrons, pixel.saturation_e) if clips else electrons
-        if not rounds:
-            return unquantized(held, pixel)
-        if noisy:
-            means = [read_once_law(pixel, rounds=rounds).at(0, electrons, 1)[0] for rounds in (True, False)]
-            return np.asarray(unquantized(held, pixel) + means[0] - means[1])
-        return rounded(held * pixel.dn_per_e, pixel)
-
-    def _merged(
-        self, electrons: Float[Array, "captures designs cases signals pixels"], rows: int
-    ) -> list[DesignPixels]:
-        """Return means and variances of merged values: by a law where exposures have their fixed share of electrons."""
-        if (full_e := self._full_e(electrons)) is None:
-            values = merge.merged(electrons, self.capture_light_of(electrons), self.pixel)
-            return [values.mean, values.variance][:rows]
-        result, groups = np.empty((rows, *full_e.shape)), groups_of(self.capture_light)
-        law = pixel_law(self.pixel, tuple(light for light, _ in groups))
-        for number, (_, at) in enumerate(groups):
-            result[..., at] = law.at(number, full_e[..., at], rows)
-        return [*result]
-
-    def _full_e(self, electrons: Float[Array, "captures designs cases signals pixels"]) -> DesignPixels | None:
-        """Return electrons of a pixel of full sensitivity; None where exposures have no fixed share of them."""
-        full_e = electrons[0] / self.capture_light_of(electrons)[0]
-        shares = zip(electrons[1:], self.capture_light[1:], strict=True)
-        return full_e if all(same_electrons(of_one, full_e, share) for of_one, share in shares) else None
-
-    def capture_light_of(self, electrons: Float[Array, "captures ... pixels"]) -> Float[Array, "captures ... pixels"]:
-        """Return the relative light of exposures, broadcast to their electrons."""
-        shape = (len(electrons), *(1,) * (electrons.ndim - 2), electrons.shape[-1])
-        return self.capture_light.reshape(shape)
-
-    def folded(self, dn: Float[Array, "designs ... pixels"]) -> Float[Array, "designs ... channels"]:
-        """Combine the elements to channels, DN.
-
-        `dn`: digital numbers, DN.
-        """
-        return dn if self.by_channel else self._weighed(dn, self.weights)
-
-    def spread(self, variance: DesignPixels) -> DesignCases:
-        """Combine variances of the elements to those of the channels, DN^2.
-
-        `variance`: variance, DN^2.
-        """
-        return self._weighed(variance, self.spread_weights)
-
-    def with_noise(
-        self, electrons: Float[Array, "*captures designs cases signals pixels"]
-    ) -> tuple[DesignCases, DesignCases]:
-        """Return mean and variance of a block with noise.
-
-        `electrons`: expected electrons; elements are pixels. Of an HDR pixel those of each exposure, on the first axis.
-        """
-        if self.pixel.captures:
-            mean, variance = self._merged(electrons, 2)
-            return self.folded(mean), self.spread(variance)
-        dn, variance_dn = read_once_law(self.pixel).at(0, electrons, 2)
+    def moments(self, electrons: Electrons, light: CaptureLight) -> tuple[Numbers, Numbers]:  # noqa: ARG002
+        """Return means and variances."""
+        dn, variance_dn = read_once_law(self.pixel).at(0, electrons[0], 2)
         # A digital number that is the same in all but one of a billion readouts: what is left of its noise is
         # rounding of the arithmetic, by which two signals would seem separated with certainty.
         certain = variance_dn < _CERTAIN_DN2
-        dn, variance_dn = np.where(certain, np.rint(dn), dn), np.where(certain, 0.0, variance_dn)
-        return self.folded(dn), self.spread(variance_dn)
+        return np.where(certain, np.rint(dn), dn), np.where(certain, 0.0, variance_dn)
 
-    def of_pixels(self, values: Float[Array, " ..."]) -> Float[Array, " ..."]:
-        """Return values of the pixels of a tile, row by row, from those of channels that fill the field."""
-        if self.by_channel and self.setup.scene.target is None:
-            return values[..., self.setup.camera.mosaic.indices.ravel()]
-        return values
 
-    def _weighed(self, values: DesignPixels, weights: Float[Array, "_positions pixels channels"]) -> DesignCases:
-        """Sum over the elements with weights."""
-        repeats = values.shape[1] // self.n_cases
-        return np.asarray(values @ np.repeat(weights, repeats, axis=0))
+@dataclass(frozen=True)
+class Merged:
+    """An HDR pixel, whose captures are merged to one value; as `ReadOnce` otherwise.
+
+    `proportional`: all exposures have their fixed share of the electrons; no pulse, crosstalk or QE tells them apart.
+    """
+
+    pixel: Pixel
+    noisy: bool
+    proportional: bool
+
+    def mean(self, electrons: Electrons, light: CaptureLight) -> Numbers:
+        """Return digital numbers; under noise their means."""
+        if self.noisy:
+            return self._moments(electrons, light, 1)[0]
+        return merge.without_noise(electrons, _beside(light, electrons), self.pixel)
+
+    def moments(self, electrons: Electrons, light: CaptureLight) -> tuple[Numbers, Numbers]:
+        """Return means and variances."""
+        mean, variance = self._moments(electrons, light, 2)
+        return mean, variance
+
+    def _moments(self, electrons: Electrons, light: CaptureLight, rows: int) -> Sequence[Numbers]:
+        """Return means and variances, by a law of the electrons of a pixel of full sensitivity if there is one."""
+        if not self.proportional:
+            values = merge.merged(electrons, _beside(light, electrons), self.pixel)
+            return [values.mean, values.variance][:rows]
+        full_e, groups = electrons[0] / _beside(light, electrons)[0], groups_of(light)
+        law = pixel_law(self.pixel, tuple(of_group for of_group, _ in groups))
+        result = np.empty((rows, *full_e.shape))
+        for number, (_, at) in enumerate(groups):
+            result[:, at] = law.at(number, full_e[at], rows)
+        return [*result]
+
+
+def _beside(light: CaptureLight, electrons: Electrons) -> Float[Array, "exposures elements ..."]:
+    return light.reshape(*light.shape, *(1,) * (electrons.ndim - 2))
+
+
+Readout = ReadOnce | Merged
+
+
+def readout_of(setup: Setup) -> Readout:
+    """Return how the pixel of a scene is read."""
+    pixel, noisy = setup.camera.pixel, setup.scene.noise is not None
+    if pixel.captures:
+        return Merged(pixel, noisy, _proportional(setup))
+    clips, rounds = setup.computes("saturation"), setup.computes("quantization")
+    most_e = pixel.saturation_e if clips else np.inf
+
+    def held(electrons: SameShape) -> SameShape:
+        return unquantized(np.minimum(electrons, most_e), pixel)
+
+    def mean(electrons: SameShape) -> SameShape:
+        return np.asarray(read_once_law(pixel, rounds=rounds).at(0, electrons, 1)[0])
+
+    def dithered(electrons: SameShape) -> SameShape:
+        means = [read_once_law(pixel, rounds=of_steps).at(0, electrons, 1)[0] for of_steps in (True, False)]
+        return np.asarray(held(electrons) + means[0] - means[1])
+
+    def whole(electrons: SameShape) -> SameShape:
+        return rounded(np.minimum(electrons, most_e) * pixel.dn_per_e, pixel)
+
+    if is_noisy(setup):
+        return ReadOnce(pixel, mean)
+    if rounds:
+        return ReadOnce(pixel, dithered if noisy else whole)
+    return ReadOnce(pixel, held)
+
+
+def _proportional(setup: Setup) -> bool:
+    """Return whether all exposures of an HDR pixel have their fixed share of the electrons."""
+    exposures, pixel = exposures_of(setup), setup.camera.pixel
+    windows = {(capture.start_ratio, capture.exposure_ratio) for capture, _ in pixel.exposures}
+    pulsed = setup.scene.drive is not None and setup.computes("flicker")
+    if len({exposure.crosstalk for exposure in exposures}) > 1 or (pulsed and len(windows) > 1):
+        return False
+    alike = all((exposure.factors == exposures[0].factors).all() for exposure in exposures)
+    return alike or not (exposures[0].crosstalk or pixel.dark_e_per_s)
 
 
 def is_noisy(setup: Setup) -> bool:

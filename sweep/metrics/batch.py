@@ -22,8 +22,9 @@ from ..base.types import (
     PerChannel,
     PerDesign,
 )
+from ..camera.along import AlongReadings
 from ..camera.brightness import LampReadings
-from ..camera.model import Changing, SceneModel, scene_model
+from ..camera.model import SceneModel, scene_model
 from ..camera.readout import NoisyReadout
 from ..camera.setup import Setup
 from ..designs.block import Block, CurveBlock
@@ -213,42 +214,42 @@ class Batch:
         return self.model.read_with_noise(self.curves)
 
     @cached_property
-    def changing(self) -> Changing | None:
+    def along(self) -> AlongReadings | None:
         """Readings of the designs that differ in one channel alone."""
-        return None if self.noisy else self.model.changing(self.block)
+        return None if self.noisy else self.model.along(self.block)
 
     @cached_property
     def exposure_s(self) -> PerDesign:
         """Exposure time of each design."""
-        if self.changing is not None and self.changing.which.all():
-            return np.full(self.size, self.changing.exposure_s)
+        if self.along is not None and self.along.which.all():
+            return np.full(self.size, self.along.exposure_s)
         return self.model.exposure_s(self.curves)
 
     @cached_property
     def _response(self) -> DesignCases:
-        """All channels of the designs that are not `changing`."""
+        """All channels of the designs that are not `along`."""
         if self.noisy:
             return self.read_with_noise.mean
         return self.model.read(self._rest)[0]
 
     @cached_property
     def _rest(self) -> DesignCurves:
-        if self.changing is None:
+        if self.along is None:
             return self.curves
-        return self.block.subset(np.flatnonzero(~self.changing.which)).curves()
+        return self.block.subset(np.flatnonzero(~self.along.which)).curves()
 
     def readings(self) -> Iterator[tuple[np.ndarray, slice, CaseReadings]]:
         """Yield designs, cases, and their readings, cases first."""
-        changing = self.changing
-        if changing is not None:
-            designs = np.flatnonzero(changing.which)
+        along = self.along
+        if along is not None:
+            designs = np.flatnonzero(along.which)
             for start in range(0, designs.size, _AT_ONCE):
                 part = slice(start, start + _AT_ONCE)
-                values, dark = changing.make(part), changing.unlit(part)
-                for case, fixed in enumerate(changing.fixed):
-                    of_case = self.setup, self.pairs, dark[:, case], None, fixed, changing.channel, values[:, case]
+                values, dark = along.make(part), along.unlit(part)
+                for case, fixed in enumerate(along.fixed):
+                    of_case = self.setup, self.pairs, dark[:, case], None, fixed, along.channel, values[:, case]
                     yield designs[part], slice(case, case + 1), CaseReadings(*of_case)
-        rest = np.arange(self.size) if changing is None else np.flatnonzero(~changing.which)
+        rest = np.arange(self.size) if along is None else np.flatnonzero(~along.which)
         if rest.size:
             yield from self._whole_readings(rest)
 

@@ -104,7 +104,7 @@ class BrightnessCurves:
         """Mean, variance and largest variance up to there of each lamp at these brightnesses, lamp by lamp."""
         from ..camera.noise.law_kernels import largest_variances, read_lamps  # noqa: PLC0415  (compiled)
 
-        roots = np.empty((3, self._starts.size, self.lamps.readout.weights.shape[2]))
+        roots = np.empty((3, self._starts.size, self.lamps.weights.shape[1]))
         lamps, every = self.lamps.in_kernels, np.arange(self.lamps.n_signals)
         read_lamps(lamps, every, self._starts, roots[0], roots[1])
         largest_variances(lamps, self._starts, roots[2].reshape(*self._starts.shape, -1))

@@ -79,7 +79,7 @@ def evaluate(
         batch.by_case |= metric.of_cases(batch)
     quantities = quantities_of(requested)
     batch.columns = over_cases(model, batch.by_case, quantities) | {EXPOSURE: batch.exposure_s}
-    if can_refine(model.setup):
+    if can_refine(model):
         wanted_names = frozenset(batch.by_case if refined is None else refined)
         wanted_names |= {name.replace(CHROMATIC_ERROR, CHROMATIC_DPRIME) for name in wanted_names}
         parts = [(sought, model) for sought in _of_readings(batch, readings, of_readings, wanted_names)]
@@ -146,7 +146,7 @@ def evaluate_some(
     """Return quantities of one design, by no more than they need."""
     metrics, names = {quantity.metric for quantity in quantities}, {quantity.name for quantity in quantities}
     camera = model.setup.camera
-    has_sums = few_pixels(model.setup.scene, camera.pixel, camera.mosaic) is not None
+    has_sums = few_pixels(model.setup.scene, camera.pixel, camera.mosaic)
     if CHROMATIC_ERROR in metrics and has_sums:  # exact sums may be larger
         metrics.add(ERROR)
     requested = RequestedQuantities(model.setup.lights.classes, tuple(states), flicker=True)

@@ -51,12 +51,12 @@ def _named(setup: Setup, lights: Int[IndexArray, "rows 2"]) -> NDArray[np.object
 
 def limiting_lights_of(model: SceneModel, block: Block) -> LimitingLights:
     """Return the limiting lights of a batch of designs."""
-    changing = model.changing(block)
-    if changing is None:
+    along = model.along(block)
+    if along is None:
         return limiting_lights(model.setup, model.read(block.curves())[0])
-    all_channels = changing.whole(slice(None))
+    all_channels = along.whole(slice(None))
     response = np.empty((len(block), *all_channels.shape[1:]))
-    response[changing.which] = all_channels
-    if not changing.which.all():
-        response[~changing.which] = model.read(block.subset(np.flatnonzero(~changing.which)).curves())[0]
+    response[along.which] = all_channels
+    if not along.which.all():
+        response[~along.which] = model.read(block.subset(np.flatnonzero(~along.which)).curves())[0]
     return limiting_lights(model.setup, response)

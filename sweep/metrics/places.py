@@ -14,11 +14,10 @@ import numpy as np
 from ..base.errors import SweepError, ValidationIssue
 from ..base.types import Array, Bool, BoolArray, Float, PerDesign, SameShape
 from ..camera.axis import Axis, Search
+from ..camera.electrons import View
 from ..camera.memory import blocks
-from ..camera.model import SceneModel, View
+from ..camera.model import SceneModel
 from ..camera.phases import axis_of, phases_at
-from ..camera.pwm import moment_axis
-from ..camera.setup import Setup
 from .quantity import BEST_PHASE, DN, Columns, Quantity
 
 HEIGHT_ROUNDS = 4
@@ -68,10 +67,11 @@ def over_cases(model: SceneModel, cases: Columns, quantities: Quantities) -> Col
     return columns
 
 
-def can_refine(setup: Setup) -> bool:
+def can_refine(model: SceneModel) -> bool:
     """Return whether a scene has an axis between whose places values may be worse."""
+    setup = model.setup
     fine = setup.accuracy.finest_phase_px > 0
-    return bends_over_pulse(setup) or (fine and (setup.all_phases or setup.all_heights))
+    return model.light.bends or (fine and (setup.all_phases or setup.all_heights))
 
 
 def refine(
@@ -105,17 +105,6 @@ def _of_oriented(quantity: Quantity, value: float) -> float:
     return -value if quantity.direction == "less" else value
 
 
-def bends_over_pulse(setup: Setup) -> bool:
-    """Return whether a value may be worst at any moment of a pulse.
-
-    Of whole numbers: only where they may clip, too, and the worst places are refined.
-    """
-    drive, rounds = setup.scene.drive, setup.scene.noise is None and setup.computes("quantization")
-    clips = setup.computes("saturation") and setup.accuracy.finest_phase_px > 0
-    bends = not setup.linear and (not rounds or clips)
-    return drive is not None and setup.computes("flicker") and bends
-
-
 @dataclass(frozen=True)
 class _Refinement:
     """Values of some designs that are refined side by side: those sought, then the negatives of the best."""
@@ -129,7 +118,7 @@ class _Refinement:
     def put(self, columns: Columns) -> None:
         """Put refined values into columns."""
         model, setup = self.model, self.model.setup
-        fine, pulsed = setup.accuracy.finest_phase_px > 0, bends_over_pulse(setup)
+        fine, pulsed = setup.accuracy.finest_phase_px > 0, model.light.bends
         if setup.all_phases and fine:
             axis = axis_of(setup, finer=self.sought.fine)
             everywhere = np.ones((len(self.sought.designs), len(axis.places)), dtype=bool)
@@ -139,7 +128,7 @@ class _Refinement:
                 values = self._at_worst_moments(values, places)
             self._put(columns, values, best=True)
         elif pulsed and not setup.all_heights:
-            own = [*model.own_views()]
+            own = model.own_views
             values = np.stack([self._over_pulse(number, own) for number in range(len(self.sought.designs))])
             self._put(columns, values, best=model.n_cases == 1)
         if setup.all_heights and fine:
@@ -235,7 +224,8 @@ class _Refinement:
         for number, of_values in enumerate(places):
             distinct, which = np.unique(of_values, axis=0, return_inverse=True)
             for at, place in enumerate(distinct):
-                views = [*self.model.views(phases_at(self.model.setup, place[None])[0])]
+                phases = phases_at(self.model.setup, place[None])[0]
+                views = [*self.model.views(phases)]
                 there, here = self._over_pulse(number, views), which.ravel() == at
                 worst[number, :n] = np.where(here[:n], np.minimum(values[number, :n], there[:n]), worst[number, :n])
                 worst[number, n:] = np.where(here[n:], np.maximum(values[number, n:], there[n:]), worst[number, n:])
@@ -248,6 +238,6 @@ class _Refinement:
             values = self._read(number, self.model.at(views, moments[:, 0]))
             return np.asarray(values.reshape(1, len(values), -1, len(moments)).min(axis=2))
 
-        axis = moment_axis(self.model.setup, self.exposure_s[self.sought.designs[number]])
+        axis = self.model.light.axis(self.exposure_s[self.sought.designs[number]])
         least = Search(axis, at, at(axis.places, np.ones((1, len(axis.places)), dtype=bool))).run()[0]
         return self._both_ends(least[0, :, None])[:, 0]

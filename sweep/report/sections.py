@@ -421,7 +421,7 @@ def conditions(run: Run) -> Pairs:
     read_under_noise = [(scene, pixel) for scene, pixel in zip(scenes, pixels, strict=True) if scene.noise]
     if run.study.recognition is not None and read_under_noise:
         mosaics = [run.output.mosaic(cfa) for cfa in run.study.cfas]
-        summed = {few_pixels(*reading, mosaic) is not None for reading in read_under_noise for mosaic in mosaics}
+        summed = {few_pixels(*reading, mosaic) for reading in read_under_noise for mosaic in mosaics}
         of_some = "exact sums of few pixels, else Q(d'/2)" if False in summed else "exact sums"
         found.append(("errors", f"{of_some}; of any brightness Q(d'/2)" if True in summed else "Q(d'/2)"))
     limits = []

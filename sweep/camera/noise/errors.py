@@ -47,17 +47,14 @@ def _bins(pixel: Pixel) -> tuple[int, float, int]:
     return wide, pixel.read_noise_e * pixel.dn_per_e / wide, pixel.full_scale_dn // wide + 1
 
 
-def few_pixels(scene: Scene, pixel: Pixel, mosaic: Mosaic) -> tuple[Int[IndexArray, " _pixels"], ...] | None:
-    """Return the pixels whose mean is each channel; None for a target, and where their sums are too many."""
-    if scene.target is not None or mosaic.counts.max() > (_MOST_MERGED if pixel.captures else _MOST_PIXELS):
-        return None
-    channels = mosaic.indices.ravel()
-    pixels = tuple(np.flatnonzero(channels == at) for at in range(len(mosaic.channels)))
-    return pixels if affordable(pixel, pixels) else None
+def few_pixels(scene: Scene, pixel: Pixel, mosaic: Mosaic) -> bool:
+    """Return whether a channel is the mean of so few pixels that their sums are made; never of a target's."""
+    most = _MOST_MERGED if pixel.captures else _MOST_PIXELS
+    return scene.target is None and mosaic.counts.max() <= most and affordable(pixel, int(mosaic.counts.max()))
 
 
-def affordable(pixel: Pixel, channels: Sequence[Int[IndexArray, " _pixels"]]) -> bool:
-    """Return whether the sums of any signal take at most `_MOST_SUMS` additions and `_MOST_BINS` bins."""
+def affordable(pixel: Pixel, pixels: int) -> bool:
+    """Return whether sums over so many pixels take at most `_MOST_SUMS` additions and `_MOST_BINS` bins."""
     if pixel.captures:
         return countable(pixel)
     (wide, sigma, n_bins), prnu = _bins(pixel), pixel.prnu
@@ -68,7 +65,6 @@ def affordable(pixel: Pixel, channels: Sequence[Int[IndexArray, " _pixels"]]) ->
     counts = min(most, 2 * _FAR * prnu * electrons + counts_of_gain) + 1
     reach = 2 * _FAR * sigma + 3
     bins = min(n_bins, counts * pixel.dn_per_e / wide + reach)
-    pixels = max(len(pixels_of_channel) for pixels_of_channel in channels)
     sums = 10 * gains * counts_of_gain + counts * reach + (64 / sigma * reach if sigma > _LEAST_BINS else 0)
     return bins * pixels <= _MOST_BINS and sums + (bins * (pixels - 1)) ** 2 <= _MOST_SUMS
 

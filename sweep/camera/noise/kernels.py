@@ -233,14 +233,3 @@ def merged_shares(
                 total[columns[entry]] += chosen[k, count] * shares[entry]
     low, high = occurring(total, _RARE_COUNT)
     return low, total[low:high] / all_gains
-
-
-@njit(cache=True, nogil=True)
-def all_near(first: FloatArray, second: FloatArray, share: FloatArray, relative: float, absolute: float) -> bool:
-    """Return whether rows are a share of others, as `np.allclose` has it, without its arrays of their size."""
-    for row in range(first.shape[0]):
-        for at in range(first.shape[1]):
-            expected = second[row, at] * share[at]
-            if not abs(first[row, at] - expected) <= relative * abs(expected) + absolute:
-                return False
-    return True

@@ -26,8 +26,6 @@ _LEAST_PRNU = 1e-9
 """A smaller PRNU spaces nodes as evenly, but for rounding."""
 _CUT, _CUT_ROOT = 1e-5, 1 / 64
 """Share of the noise by which the ends of the range may shift an unclipped mean; step of the root of the electrons."""
-_EQUAL, _NONE = 1e-9, 1e-12
-"""Relative difference of electrons that are the same, and electrons that are none."""
 STEPS_DN2 = 1 / 12
 """Least variance that a search takes, DN^2, as of rounding: a saturated pixel has none, and no direction to go."""
 
@@ -191,18 +189,6 @@ def knees_of(pixel: Pixel, light: Sequence[float]) -> Float[Array, " knees"]:
         )
     ]
     return np.array(ends)
-
-
-def same_electrons(
-    first: Float[Array, "*batch pixels"],
-    second: Float[Array, "*batch pixels"],
-    share: float | Float[Array, " pixels"] = 1.0,
-) -> bool:
-    """Return whether electrons are the same but for rounding; `share`: of the second ones that the first have."""
-    from .kernels import all_near  # noqa: PLC0415  (compiled: kept off the start-up path)
-
-    one, other = (np.ascontiguousarray(electrons).reshape(-1, first.shape[-1]) for electrons in (first, second))
-    return bool(all_near(one, other, np.broadcast_to(share, first.shape[-1]), _EQUAL, _NONE))
 
 
 def groups_of(light: Float[Array, "captures pixels"]) -> list[tuple[tuple[float, ...], Int[IndexArray, " _pixels"]]]:

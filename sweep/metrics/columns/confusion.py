@@ -78,11 +78,12 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
 
 def _exact(batch: Batch) -> dict[Pair, Float[Array, "cases designs"]] | None:
     """Return errors in each case by exact sums; None if these are too many."""
-    readout = batch.model.readout
-    pixels = errors.few_pixels(batch.setup.scene, readout.pixel, batch.setup.camera.mosaic)
-    if pixels is None:
+    model, pixel = batch.model, batch.setup.camera.pixel
+    if not errors.few_pixels(batch.setup.scene, pixel, batch.setup.camera.mosaic):
         return None
-    light = readout.of_pixels(readout.capture_light) if readout.pixel.captures else None
-    electrons = np.moveaxis(batch.model.pixel_electrons(batch.curves), -3, 0)
-    of_cases = [errors.errors(case, pixels, readout.pixel, batch.confused, light) for case in electrons]
+    view = model.own_views[0]
+    channels, light = view.image.pixels_of_channels(), view.capture_light(model.exposures) if pixel.captures else None
+    of_exposures = model.pixel_electrons(batch.curves)
+    electrons = np.moveaxis(of_exposures if pixel.captures else of_exposures[0], -3, 0)
+    of_cases = [errors.errors(case, channels, pixel, batch.confused, light) for case in electrons]
     return {pair: np.array([of_case[pair] for of_case in of_cases]) for pair in of_cases[0]}
