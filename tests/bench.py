@@ -75,7 +75,7 @@ def swept(study: Study) -> tuple[Space, Setup]:
 
 def distances(imager: SceneModel, block: Any) -> None:
     """All CSDs of a block."""
-    changing = imager.changing(block)
+    changing = imager.along(block)
     assert changing is not None
     members = imager.setup.members
     separations_along(changing.fixed[0], changing.channel, changing.make(slice(None))[:, 0], members)
@@ -149,7 +149,7 @@ def kernels(study: Study, found: dict[str, Any]) -> None:
     for route, numbers in (("dense", flat.shape[1]), ("separable", table.shape[1])):
         moved = 2 * 8 * numbers * found[f"{route}_designs_per_s"] / 1e9
         found[f"{route}_bytes_over_machine_copy"] = moved / found["copy_gbytes_per_s"]
-    changing = imager.changing(edges)
+    changing = imager.along(edges)
     assert changing is not None
     fixed, values = changing.fixed[0], changing.make(slice(None))[:, 0]
     response = np.repeat(fixed[None], BLOCK, axis=0)

@@ -8,8 +8,9 @@ import numpy as np
 from scipy.special import ndtr
 from scipy.stats import poisson
 
+from sweep.camera.image import Pixels
+from sweep.camera.model import SceneModel
 from sweep.camera.pixel import Pixel
-from sweep.camera.readout import Readout
 
 
 def digital_numbers(electrons: float, pixel: Pixel) -> tuple[np.ndarray, np.ndarray]:
@@ -38,12 +39,23 @@ def digital_numbers(electrons: float, pixel: Pixel) -> tuple[np.ndarray, np.ndar
     return numbers, found
 
 
-def channels_of(readout: Readout, pixels: np.ndarray, phase: int) -> np.ndarray:
-    """The channels from their pixels; of a light that fills the field, from those of one tile."""
-    mosaic = readout.setup.camera.mosaic
-    if readout.setup.scene.target is not None:
-        return pixels @ readout.weights[phase]
-    return pixels @ ((mosaic.indices.ravel()[:, None] == np.arange(len(mosaic.channels))) / mosaic.counts)
+def pixels_of(model: SceneModel, curves: np.ndarray, place: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """One design's pixels at a sampling phase, [exposures, moments, signals, pixels], their weights, and their light."""
+    view = model.own_views[0]
+    per_place = model.scales(model.exposure_s(curves)).shape[-1]
+    electrons = (
+        model.at([view])
+        .pixel_electrons(curves)[:, 0]
+        .reshape(len(model.exposures), -1, per_place, *(len(model.setup.lights.names), view.image.channel.size))
+    )
+    if isinstance(view.image, Pixels):
+        entries = slice(view.image.bounds[place], view.image.bounds[place + 1])
+        used, weight = view.image.element[entries], view.image.weight[entries]
+    else:
+        used = np.concatenate(view.image.pixels_of_channels())
+        weight = 1 / np.repeat(view.image.counts, view.image.counts)
+    of_channel = view.image.channel[used][:, None] == np.arange(view.image.n_channels)
+    return electrons[:, 0][..., used], of_channel * weight[:, None], view.capture_light(model.exposures)[:, used]
 
 
 def moments(electrons: float, pixel: Pixel) -> tuple[float, float]:

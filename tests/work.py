@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from sweep.camera.model import SceneModel
-from sweep.camera.readout import Readout
+from sweep.camera.readout import Merged, ReadOnce
 from sweep.metrics.brightness import BrightnessCurves
 from sweep.metrics.evaluate import evaluate
 from sweep.search.problem import starting_points
@@ -39,7 +39,8 @@ class Counter:
 
     def __enter__(self) -> Counter:
         """Begin to count."""
-        self._count(Readout, "transfer", lambda result: self._add("values", int(np.size(result))))
+        for readout in (ReadOnce, Merged):
+            self._count(readout, "mean", lambda result: self._add("values", int(np.size(result))))
         self._count(BrightnessCurves, "nearest", lambda _: self._add("walks", 1))
         self._count(BrightnessCurves, "follow", lambda _: self._add("follows", 1))
         sys.setprofile(self._entered)

@@ -42,11 +42,11 @@ class Along:
         self.weights = np.concatenate([white[None], *backgrounds, *lit]).T
         self.fixed_white = fixed_white
         self.exposure_s = float(exposure_times(self.setup, np.zeros((1, 1)), fixed_white)[0])
-        rates = [view.rates(nothing, exposure) for view in views]
         n = len(self.setup.camera.mosaic.channels)
-        rest, dark = (np.concatenate([of[at][:, 0] for of in rates]) for at in (0, 1))
+        rest = np.concatenate([view.rates(nothing, exposure)[:, 0] for view in views])
+        dark = np.concatenate([view.unlit(nothing, exposure) for view in views])
         self.dark_e = (dark * self.exposure_s).reshape(-1, n)
-        electrons = (rest + dark[:, None]) * self.exposure_s
+        electrons = (rest + dark) * self.exposure_s
         fixed = readout.mean(electrons[None], np.ones((1, len(rest))))
         self.fixed = np.swapaxes(fixed.reshape(-1, n, fixed.shape[1]), 1, 2)
 
@@ -91,27 +91,12 @@ class AlongReadings:
     which: Bool[BoolArray, " designs"]
     products: Float[Array, "which columns"]
 
-    @property
-    def fixed(self) -> Float[Array, "cases signals channels"]:
-        """Digital numbers of the shared channels, DN; those of the channel are undefined."""
-        return self.of.fixed
-
-    @property
-    def channel(self) -> int:
-        """Number of the channel in which designs differ."""
-        return self.of.channel
-
-    @property
-    def exposure_s(self) -> float:
-        """Exposure time of all of them, s."""
-        return self.of.exposure_s
-
     def make(self, part: slice) -> _ByCase:
         """Return digital numbers of that channel of some designs, DN."""
-        own, (n_cases, n_signals) = self._unlit_e(part), self.fixed.shape[:2]
+        own, (n_cases, n_signals) = self._unlit_e(part), self.of.fixed.shape[:2]
         electrons = self.products[part, -n_cases * n_signals :].copy().reshape(-1, n_cases, n_signals)
         # In place: to give memory to an array of all signals takes as long as a sum.
-        electrons *= self.exposure_s
+        electrons *= self.of.exposure_s
         electrons += own[..., None]
         flat = electrons.reshape(1, -1, n_signals)
         return self.of.readout.mean(flat, np.ones(flat.shape[:2])).reshape(electrons.shape)
@@ -120,17 +105,17 @@ class AlongReadings:
         """Return the readings of all channels without lamps, unquantized, DN."""
         own = self._unlit_e(part)
         electrons = np.repeat(self.of.dark_e[None], len(own), axis=0)
-        electrons[..., self.channel] = own
+        electrons[..., self.of.channel] = own
         return unquantized(electrons, self.of.setup.camera.pixel)
 
     def _unlit_e(self, part: slice) -> Float[Array, "_designs cases"]:
         backgrounds = self.products[part, 1 : 2 + self.of.view[-1]][:, self.of.view]
-        unlit_e = backgrounds * self.of.uniform * self.exposure_s + self.of.dark_e[:, self.channel]
+        unlit_e = backgrounds * self.of.uniform * self.of.exposure_s + self.of.dark_e[:, self.of.channel]
         return np.asarray(unlit_e, dtype=float)
 
     def whole(self, part: slice) -> DesignCases:
         """Return all channels of some designs."""
         values = self.make(part)
-        all_channels = np.repeat(self.fixed[None], len(values), axis=0)
-        all_channels[..., self.channel] = values
+        all_channels = np.repeat(self.of.fixed[None], len(values), axis=0)
+        all_channels[..., self.of.channel] = values
         return all_channels

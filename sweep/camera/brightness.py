@@ -174,8 +174,8 @@ class LampReadings:
             squares, tables = weights, np.arange(self.n_signals * n, dtype=np.intp).reshape(-1, n)
         used = (weights != 0) | (squares != 0)
         only = np.where(used.sum(axis=1) > 1, weights.shape[1], np.where(used.any(axis=1), used.argmax(axis=1), -1))
-        arrays = (np.ascontiguousarray(of) for of in (lit, dark, tables, *law, weights, squares, only))
-        return cast("Lamps", tuple(arrays))
+        arrays = lit, dark, tables, *law, weights, squares, only
+        return cast("Lamps", tuple(map(np.ascontiguousarray, arrays)))
 
     def _laws_of_brightness(self) -> list[Law]:
         """Return the law of each channel of each lamp over its brightness, through values at `_nodes`."""

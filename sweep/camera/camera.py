@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class Camera:
         """Curves that the modified channels replace."""
         return self.qe[list(self.modified)]
 
-    @property
+    @cached_property
     def fixed(self) -> tuple[int, ...]:
         """Channels that no design modifies."""
         return tuple(i for i in range(len(self.mosaic.channels)) if i not in self.modified)
@@ -51,7 +52,7 @@ class Camera:
         """
         return index_of(self.technologies[channel]) if self.technologies else math.inf
 
-    @property
+    @cached_property
     def moving(self) -> tuple[int, ...]:
         """Channels whose filter moves with the angle of the light."""
         return tuple(c for c in range(len(self.mosaic.channels)) if math.isfinite(self.effective_index(c)))

@@ -48,19 +48,8 @@ class PixelLight:
 
         Returns light relative to a uniform field.
         """
-        return self._at_wavelengths(self.values)[self.place]
-
-    def folded(self, weights: Float[Array, "cases rows columns places"]) -> Float[Array, "cases places _wavelengths"]:
-        """Sum over the pixels of each case with weights."""
-        result = np.empty((len(weights), weights.shape[-1], self.values.shape[1]))
-        for case, case_weights in enumerate(weights):
-            used = np.flatnonzero(case_weights.any(axis=2))
-            pixel_weights = case_weights.reshape(-1, case_weights.shape[2])[used]
-            result[case] = pixel_weights.T @ self.values[self.place[case].ravel()[used]]
-        return self._at_wavelengths(result)
-
-    def _at_wavelengths(self, values: Float[Array, "*batch functions"]) -> Float[Array, "*batch wavelengths"]:
-        return values if self.shares is None else np.asarray(values @ self.shares)
+        by_place = self.values if self.shares is None else self.values @ self.shares
+        return np.asarray(by_place[self.place])
 
 
 def different(

@@ -21,43 +21,51 @@ Dark = Float[Array, "elements designs"]
 class View:
     """Cases of a scene at one image height: lamps and filters there, and the image on the pixels.
 
-    `fixed`: electrons/s behind the filters that no design modifies, of signals and background, for each exposure.
+    `known`: what `fixed` returns for each exposure.
     """
 
     setup: Setup
     position: Position
     image: Image
-    fixed: dict[Exposure, tuple[Float[Array, "elements signals"], Float[Array, "elements 1"]]] = field(
+    known: dict[Exposure, tuple[Float[Array, "elements 1 signals"], Float[Array, "elements 1"]]] = field(
         default_factory=dict
     )
 
     def subset(self, cases: Int[IndexArray, " cases"]) -> View:
         """Return the view of some cases."""
         image, used = self.image.subset(cases)
-        return replace(self, image=image, fixed={of: (lit[used], dark[used]) for of, (lit, dark) in self.fixed.items()})
+        return replace(self, image=image, known={of: (lit[used], dark[used]) for of, (lit, dark) in self.known.items()})
 
-    def added(self, curves: DesignCurves, exposure: Exposure, channels: Sequence[int]) -> tuple[Lit, Dark]:
-        """Return electrons/s of each signal, and of the background, behind some filters alone."""
-        qe = curves if exposure.plain else curves * exposure.factors[list(channels), None]
-        rates, background = self.position.rates(qe, channels, self.image.shares)
+    def lit(self, qe: DesignCurves, channels: Sequence[int], exposure: Exposure) -> Lit:
+        """Return electrons/s of each signal behind some filters alone."""
+        rates = self.position.lit(exposure.seen(qe, channels), channels, self.image.shares)
         lit = self.image.lit(rates, channels, exposure.crosstalk)
-        return lit.reshape(len(lit), len(curves), -1), self.image.uniform(background, channels, exposure.crosstalk)
+        return lit.reshape(len(lit), len(qe), -1)
 
-    def fixed_rates(self, exposure: Exposure) -> tuple[Float[Array, "elements signals"], Float[Array, "elements 1"]]:
-        """Return electrons/s in the channels that no design modifies: of the signals, and without them."""
-        camera = self.setup.camera
-        if exposure not in self.fixed:
-            lit, dark = self.added(camera.qe[None, list(camera.fixed)], exposure, camera.fixed)
-            self.fixed[exposure] = lit[:, 0], dark + camera.pixel.dark_e_per_s
-        return self.fixed[exposure]
+    def background(self, qe: DesignCurves, channels: Sequence[int], exposure: Exposure) -> Dark:
+        """Return electrons/s of the background behind some filters alone."""
+        if self.position.dark:
+            return np.zeros((self.image.channel.size, len(qe)))
+        rates = self.position.of_background(exposure.seen(qe, channels), channels)
+        return self.image.uniform(rates, channels, exposure.crosstalk)
 
-    def rates(self, curves: DesignCurves, exposure: Exposure) -> tuple[Lit, Dark]:
-        """Return electrons/s of each signal, and without lamps: of the background, and dark current."""
-        fixed_lit, fixed_dark = self.fixed_rates(exposure)
-        lit, dark = self.added(curves, exposure, self.setup.camera.modified)
-        lit += fixed_lit[:, None]
-        dark += fixed_dark
-        return lit, dark
+    def fixed(self, exposure: Exposure) -> tuple[Float[Array, "elements 1 signals"], Float[Array, "elements 1"]]:
+        """Return electrons/s behind the filters that no design modifies: of the signals, and without them."""
+        if exposure not in self.known:
+            camera = self.setup.camera
+            behind = camera.qe[None, list(camera.fixed)], camera.fixed, exposure
+            self.known[exposure] = self.lit(*behind), self.background(*behind) + camera.pixel.dark_e_per_s
+        return self.known[exposure]
+
+    def rates(self, curves: DesignCurves, exposure: Exposure) -> Lit:
+        """Return electrons/s of each signal."""
+        lit = self.lit(curves, self.setup.camera.modified, exposure)
+        lit += self.fixed(exposure)[0]
+        return lit
+
+    def unlit(self, curves: DesignCurves, exposure: Exposure) -> Dark:
+        """Return electrons/s without lamps: of the background, and dark current."""
+        return self.background(curves, self.setup.camera.modified, exposure) + self.fixed(exposure)[1]
 
     def capture_light(self, exposures: Sequence[Exposure]) -> CaptureLight:
         """Return the light of exposures on the elements, relative to a pixel of full sensitivity."""

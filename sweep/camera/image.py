@@ -124,8 +124,8 @@ class Pixels:
         row = self.row[entries] + self.n_channels * np.repeat(np.arange(cases.size) - cases, sizes)
         bounds, parts = np.append(0, np.cumsum(sizes)), (self.place[:, used], self.through[:, used])
         place, through = map(np.ascontiguousarray, parts)
-        some = replace(self, place=place, through=through, row=row, element=element, bounds=bounds)
-        return replace(some, weight=self.weight[entries]), used
+        of_light, weight = (self.values, self.shares, place, through), self.weight[entries]
+        return Pixels(*of_light, row, element.ravel(), weight, bounds, self.n_channels), used
 
     def of_case(
         self, case: int

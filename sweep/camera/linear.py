@@ -11,7 +11,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from ..base.types import Array, ChannelCurves, CurvesGradient, DesignCases, DesignCurves, Float, FloatArray
+from ..base.types import Array, ChannelCurves, CurvesGradient, DesignCases, DesignCurves, Float, FloatArray, SameShape
 from .brightness import LampReadings, LampSlopes, room_dn
 from .electrons import View
 from .exposure import relative_slope
@@ -23,7 +23,6 @@ from .setup import READOUT, Setup
 
 _FIELD_POSITIONS = 9
 """Field positions at which a search looks where all field positions count; its best design is read out at more."""
-ElementSlopes = tuple[Float[Array, "elements moments signals"], Float[Array, "elements parameters moments signals"]]
 Slopes = tuple[Float[Array, "cases signals channels"], Float[Array, "parameters cases signals channels"]]
 """Values of one design, and their exact derivatives with that of its exposure; a pulse's share is held."""
 
@@ -67,14 +66,12 @@ class LinearModel:
 
         `lamps_only`: without black level, dark current and background.
         """
-        gain, offset = self.pixel.dn_per_e, 0.0 if lamps_only else self.pixel.offset_dn
         parts = []
         for view in self.scene.own_views:
-            electrons, by_u = self._with_slope(view, curves, curves_gradient, lamps_only=lamps_only)
-            folded = _of_cases(view.image.folded(np.concatenate([electrons[:, None], by_u], axis=1)))
-            parts.append(folded * gain)
-        values = np.concatenate(parts, axis=1)
-        return values[0] + offset, values[1:]
+            electrons = self._electrons(view, curves, curves_gradient, lamps_only=lamps_only)
+            parts.append(_of_cases(view.image.folded(electrons)))
+        values = np.concatenate(parts, axis=1) * self.pixel.dn_per_e
+        return values[0] + (0.0 if lamps_only else self.pixel.offset_dn), values[1:]
 
     def noisy_with_gradient(
         self, curves: ChannelCurves, curves_gradient: CurvesGradient
@@ -85,8 +82,9 @@ class LinearModel:
         """
         means, variances = [], []
         for view in self._by_pixel:
-            electrons, by_u = self._with_slope(view, curves, curves_gradient)
-            mean, variance, mean_per_e, variance_per_e = (of[:, None] for of in self._moments(view, electrons))
+            electrons = self._electrons(view, curves, curves_gradient)
+            by_u, moments = electrons[:, 1:], self._moments(view, electrons[:, 0])
+            mean, variance, mean_per_e, variance_per_e = (of[:, None] for of in moments)
             means.append(_of_cases(view.image.folded(np.concatenate([mean, mean_per_e * by_u], axis=1))))
             variances.append(_of_cases(view.image.spread(np.concatenate([variance, variance_per_e * by_u], axis=1))))
         mean, variance = (np.concatenate(parts, axis=1) for parts in (means, variances))
@@ -113,8 +111,7 @@ class LinearModel:
 
     def _capture_light(self, view: View) -> CaptureLight:
         """Return the light of the exposures of the pixel itself."""
-        pixel = self.pixel if self.hdr is None else self.hdr
-        return view.capture_light(exposures_of(self.setup.with_camera(pixel=pixel)))
+        return view.capture_light(exposures_of(self.setup.with_camera(pixel=self.hdr or self.pixel)))
 
     @cached_property
     def linear_over_brightness(self) -> bool:
@@ -130,30 +127,27 @@ class LinearModel:
         `curves`: QE of the modified channels; `curves_gradient`: its derivatives.
         """
         noisy, result = self.setup.scene.noise is not None, []
-        pixel = self.pixel if self.hdr is None else self.hdr
         for view in self._by_pixel:
-            lit, lit_by_u = self._with_slope(view, curves, curves_gradient, lamps_only=True)
-            dark, dark_by_u = self._dark_with_slope(view, curves, curves_gradient)
+            lit = self._electrons(view, curves, curves_gradient, lamps_only=True)
+            rows = self._unlit(view, np.concatenate([curves[None], curves_gradient]))[:, :, None, None]
+            dark = self._exposed(rows, curves, curves_gradient)[:, :, 0, 0]
             light = self._capture_light(view)
             for case in range(view.image.n_cases):
                 used, weights, spread, n_pixels = view.image.of_case(case)
-                of_light, n = light[:, used], n_pixels
-                for moment in range(lit.shape[1]):
-                    of_lamps = lit[used, moment].T * of_light[:, None], dark[used] * of_light, of_light, weights, spread
-                    lamps = LampReadings(*of_lamps, pixel, noisy, proportional=True, n_pixels=n)
-                    slopes = np.swapaxes(lit_by_u[used, :, moment], 0, 1)
-                    result.append(LampSlopes(lamps, np.swapaxes(slopes, 1, 2), dark_by_u[used].T))
+                of_light = light[:, used]
+                for moment in range(lit.shape[2]):
+                    lit_e = np.moveaxis(lit[used, :, moment], 0, 2)  # [rows, signals, elements]
+                    of_lamps = lit_e[0] * of_light[:, None], dark[used, 0] * of_light, of_light, weights, spread
+                    lamps = LampReadings(*of_lamps, self.hdr or self.pixel, noisy, proportional=True, n_pixels=n_pixels)
+                    result.append(LampSlopes(lamps, lit_e[1:], dark[used, 1:].T))
         return result
 
     def spread_electrons(self, curves: DesignCurves) -> DesignCases:
         """Return expected electrons of the pixels, weighted by their shares of a channel's variance."""
-        return np.concatenate([self._of_design(curves[at]) for at in range(len(curves))])
-
-    def _of_design(self, curves: ChannelCurves) -> DesignCases:
-        none, parts = np.empty((0, *curves.shape)), []
+        none, parts = np.empty((0, *curves.shape[1:])), []
         for view in self._by_pixel:
-            electrons = self._with_slope(view, curves, none)[0]
-            parts.append(_of_cases(view.image.spread(electrons[:, None])))
+            of_designs = [view.image.spread(self._electrons(view, design, none)) for design in curves]
+            parts.append(_of_cases(np.concatenate(of_designs, axis=2)))
         return np.concatenate(parts, axis=1)
 
     def spread_shares(self) -> Float[Array, "cases channels"]:
@@ -163,35 +157,32 @@ class LinearModel:
         shares = [view.image.spread(np.ones((view.image.channel.size, 1)))[..., 0] for view in self._by_pixel]
         return np.repeat(np.concatenate(shares), repeats, axis=0)
 
-    def _with_slope(
+    def _electrons(
         self, view: View, curves: ChannelCurves, curves_gradient: CurvesGradient, *, lamps_only: bool = False
-    ) -> ElementSlopes:
-        """Return expected electrons and their derivative."""
-        exposure_s = self.scene.exposure_s(curves[None])
-        scales = self.scene.scales(exposure_s)[0, 0]
-        both = np.concatenate([curves[None], curves_gradient])
-        lit, dark = view.added(both, self._exposure, self.setup.camera.modified)
-        fixed_lit, fixed_dark = view.fixed_rates(self._exposure)
-        lit[:, 0] += fixed_lit
-        dark[:, :1] += fixed_dark
-        rates = lit[:, :, None] * scales[:, None]
+    ) -> Float[Array, "elements rows moments signals"]:
+        """Return expected electrons of one design, and in further rows their derivatives."""
+        rows, modified = np.concatenate([curves[None], curves_gradient]), self.setup.camera.modified
+        lit = view.lit(rows, modified, self._exposure)
+        lit[:, :1] += view.fixed(self._exposure)[0]
+        rates = lit[:, :, None] * self.scene.scales(self.scene.exposure_s(curves[None]))[0, 0][:, None]
         if not lamps_only:
-            rates += dark[:, :, None, None]
-        rates *= exposure_s
+            rates += self._unlit(view, rows)[:, :, None, None]
+        return self._exposed(rates, curves, curves_gradient)
+
+    def _unlit(self, view: View, rows: DesignCurves) -> Float[Array, "elements rows"]:
+        """Return electrons/s of one design without lamps, and in further rows their derivatives."""
+        dark = view.background(rows, self.setup.camera.modified, self._exposure)
+        dark[:, :1] += view.fixed(self._exposure)[1]
+        return dark
+
+    def _exposed(
+        self, rates: SameShape, curves: ChannelCurves, curves_gradient: CurvesGradient
+    ) -> Float[Array, "elements rows moments signals"]:
+        """Return electrons from electrons/s, both with derivatives in further rows."""
+        rates *= self.scene.exposure_s(curves[None])
         relative = relative_slope(self.setup, self.scene.white, curves, curves_gradient)
         rates[:, 1:] += relative[:, None, None] * rates[:, :1]
-        return rates[:, 0], rates[:, 1:]
-
-    def _dark_with_slope(
-        self, view: View, curves: ChannelCurves, curves_gradient: CurvesGradient
-    ) -> tuple[Float[Array, " elements"], Float[Array, "elements parameters"]]:
-        """Return expected electrons without lamps, and their derivative."""
-        exposure_s = self.scene.exposure_s(curves[None])[0]
-        both = np.concatenate([curves[None], curves_gradient])
-        dark = view.added(both, self._exposure, self.setup.camera.modified)[1] * exposure_s
-        dark[:, :1] += view.fixed_rates(self._exposure)[1] * exposure_s
-        relative = relative_slope(self.setup, self.scene.white, curves, curves_gradient)
-        return dark[:, 0], dark[:, 1:] + relative * dark[:, :1]
+        return rates
 
     def per_qe(
         self, modified: int, curves: ChannelCurves, *, lamps_only: bool = False
@@ -200,28 +191,28 @@ class LinearModel:
 
         The smooth response is linear in it if the channel does not set the exposure.
         """
-        every, parts = np.ones((1, 1)), []
+        parts = []
         for view in self.scene.own_views:
-            own, image = self.setup.camera.modified[modified], view.image
-            light = image.folded(image.lit(self._every(view), [own], self._exposure.crosstalk))
-            uniform = image.folded(image.uniform(every, [own], self._exposure.crosstalk))[..., 0]
-            parts.append(self._per_qe(view, modified, curves, light, uniform * (not lamps_only)))
+            light, uniform = self._weights(view, modified)
+            of_channels = view.image.folded(light), view.image.folded(uniform) * (not lamps_only)
+            parts.append(self._per_qe(view, modified, curves, *of_channels))
         return np.concatenate(parts) * self.pixel.dn_per_e
 
     def spread_per_qe(self, modified: int, curves: ChannelCurves) -> Float[Array, "cases signals wavelengths"]:
         """Return electrons per unit of QE of one modified channel in its pixels, weighted by shares of variance."""
-        own, parts = self.setup.camera.modified[modified], []
+        own, parts = [self.setup.camera.modified[modified]], []
         for view in self._by_pixel:
-            image = view.image
-            light = image.spread(image.lit(self._every(view), [own], self._exposure.crosstalk))
-            uniform = image.spread(image.uniform(np.ones((1, 1)), [own], self._exposure.crosstalk))[..., 0]
-            parts.append(self._per_qe(view, modified, curves, light[:, [own]], uniform[:, [own]])[:, :, 0])
+            light, uniform = (view.image.spread(weights)[:, own] for weights in self._weights(view, modified))
+            parts.append(self._per_qe(view, modified, curves, light, uniform)[:, :, 0])
         return np.concatenate(parts)
 
-    @staticmethod
-    def _every(view: View) -> Float[Array, "1 functions functions"]:
-        """Return the light of each function alone."""
-        return np.eye(1 if view.image.shares is None else len(view.image.shares))[None]
+    def _weights(
+        self, view: View, modified: int
+    ) -> tuple[Float[Array, "elements functions"], Float[Array, "elements 1"]]:
+        """Return the light of elements behind the filter of a modified channel, of an image and of a uniform field."""
+        image, crosstalk, own = view.image, self._exposure.crosstalk, [self.setup.camera.modified[modified]]
+        every = np.eye(1 if image.shares is None else len(image.shares))
+        return image.lit(every[None], own, crosstalk), image.uniform(np.ones((1, 1)), own, crosstalk)
 
     def _per_qe(
         self,
@@ -229,7 +220,7 @@ class LinearModel:
         modified: int,
         curves: ChannelCurves,
         light: Float[Array, "rows channels functions"],
-        uniform: Float[Array, "rows channels"],
+        uniform: Float[Array, "rows channels 1"],
     ) -> Float[Array, "cases signals channels wavelengths"]:
         """Return electrons per unit of QE of one modified channel, from light and uniform weights of the channels."""
         position, channel, shares = view.position, self.setup.camera.modified[modified], view.image.shares
@@ -237,7 +228,7 @@ class LinearModel:
         scales = self.scene.scales(exposure_s)[0, 0]
         whole = light if shares is None else light @ shares
         lit = position.per_qe(whole[:, None] * position.signals[:, None], channel)
-        background = uniform[:, None, None, :, None] * position.per_qe(position.background, channel)
+        background = uniform[:, None, None] * position.per_qe(position.background, channel)
         total = lit[:, None] * scales[:, None, None, None] + background
         return np.asarray(total.reshape(-1, *total.shape[2:]) * exposure_s[0], dtype=float)
 

@@ -44,6 +44,8 @@ class SceneModel:
             self.phases = different_phases(setup, scene_phases(setup))[0]
         self.exposures, self.light, self.readout = exposures_of(setup), light_of(setup), readout_of(setup)
         self._whole = whole_exposure(setup) if setup.camera.pixel.captures else self.exposures[0]
+        exposures = list(enumerate(self.exposures))
+        self._same_as = [next(at for at, of in exposures if of.same_rates(exposure)) for exposure in self.exposures]
         self._positions: dict[float, place.Position] = {}
         self._moments: Float[Array, " moments"] | None = None
         self.n_cases = len(self.heights) * (1 if self.phases is None else len(self.phases))
@@ -164,17 +166,16 @@ class SceneModel:
         self, view: View, curves: DesignCurves, exposure_s: PerDesign
     ) -> tuple[Float[Array, "exposures elements designs signals"], Float[Array, "exposures elements designs"]]:
         """Return expected electrons of the lamps with the mean light of their pulses, and without lamps."""
-        parts = list[tuple[Lit, Dark]]()
+        lit, dark = list[Lit](), list[Dark]()
         for at, exposure in enumerate(self.exposures):
-            same = next((of for of in range(at) if exposure.same_rates(self.exposures[of])), None)
-            rates = view.rates(curves, exposure) if same is None else parts[same]
-            parts.append(rates)
-        light = np.array([exposure.light for exposure in self.exposures])
-        times = light[:, None] * exposure_s
-        lit, dark = (np.stack(rates) for rates in zip(*parts, strict=True))
-        lit *= times[:, None, :, None]
-        dark *= times[:, None]
-        return lit, dark
+            same = self._same_as[at]
+            lit.append(lit[same] if same < at else view.rates(curves, exposure))
+            dark.append(dark[same] if same < at else view.unlit(curves, exposure))
+        times = np.array([exposure.light for exposure in self.exposures])[:, None] * exposure_s
+        lit_e, dark_e = np.stack(lit), np.stack(dark)
+        lit_e *= times[:, None, :, None]
+        dark_e *= times[:, None]
+        return lit_e, dark_e
 
     def along(self, block: Block) -> AlongReadings | None:
         """Read designs that differ in one channel alone; those whose modified channel sets the exposure are left out.
@@ -192,8 +193,8 @@ class SceneModel:
         """Return the response without the lamps: black level, dark current and background, unquantized, DN."""
         parts = []
         for view in self.own_views:
-            rates = view.rates(curves, self._whole)[1]
-            parts.append(view.image.folded(unquantized(rates * exposure_s, self.setup.camera.pixel)))
+            electrons = view.unlit(curves, self._whole) * exposure_s
+            parts.append(view.image.folded(unquantized(electrons, self.setup.camera.pixel)))
         unlit = np.moveaxis(np.concatenate(parts), 2, 0)
         return np.repeat(unlit, self.scales(exposure_s).shape[-1], axis=1)
 

@@ -25,7 +25,8 @@ _LATTICE = 17
 class Position:
     """Lamps behind air and lens, and filters in the cone of rays, at one image height.
 
-    `signals`, `background`: electrons/s of each signal on a whole image, and of the background, per unit of QE.
+    `signals`, `background`: electrons/s of each signal on a whole image, and of the background, per unit of QE; `dark`:
+    there is no background.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -34,22 +35,28 @@ class Position:
         self._setup = setup
         self.signals = irradiance.signals * area_bins * path_factor(setup, nodes_nm)
         self.background = irradiance.background * area_bins * path_factor(setup, nodes_nm, background=True)
+        self.dark = not self.background.any()
 
     @cached_property
     def angular(self) -> AngularResponse:
         """Filters in the cone of rays there."""
         return AngularResponse(self._setup)
 
-    def rates(
+    def lit(
         self, qe: DesignCurves, channels: Sequence[int], shares: Float[Array, "functions wavelengths"] | None
-    ) -> tuple[Rates, Float[Array, "channels designs"]]:
-        """Return electrons/s of signals, [channels, functions, designs and signals], and of the background."""
-        seen = self.angular.curves(qe, channels) if self._setup.computes("angle") else qe
-        spectra = seen[:, :, None] * self.signals
+    ) -> Rates:
+        """Return electrons/s of each function of an image, in columns of designs and signals."""
+        spectra = self._seen(qe, channels)[:, :, None] * self.signals
         of_functions = spectra.sum(axis=-1, keepdims=True) if shares is None else spectra @ shares.T
         ordered = np.transpose(of_functions, (1, 3, 0, 2))
-        lit = ordered.reshape(*ordered.shape[:2], len(qe) * len(self.signals))
-        return np.ascontiguousarray(lit), np.einsum("ncw,w->cn", seen, self.background)
+        return np.ascontiguousarray(ordered.reshape(*ordered.shape[:2], len(qe) * len(self.signals)))
+
+    def of_background(self, qe: DesignCurves, channels: Sequence[int]) -> Float[Array, "channels designs"]:
+        """Return electrons/s of the background."""
+        return np.asarray(np.einsum("ncw,w->cn", self._seen(qe, channels), self.background), dtype=float)
+
+    def _seen(self, qe: DesignCurves, channels: Sequence[int]) -> DesignCurves:
+        return self.angular.curves(qe, channels) if self._setup.computes("angle") else qe
 
     def per_qe(self, light: Float[Array, "*batch wavelengths"], channel: int) -> Float[Array, "*batch wavelengths"]:
         """Return weights of a channel's curve at normal incidence, from those of its curve in the cone."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import Array, Float, PerChannel, PerDesign, SameShape
+from ..base.types import Array, DesignCurves, Float, PerChannel, PerDesign, SameShape
 from .noise import merge
 from .noise.law import groups_of, pixel_law, read_once_law
 from .noise.rounding import rounded
@@ -35,10 +35,10 @@ class Exposure:
     factors: PerChannel
     crosstalk: float
 
-    @property
-    def plain(self) -> bool:
-        """True if the QE is that of the pixel."""
-        return bool((self.factors == 1).all())
+    def seen(self, qe: DesignCurves, channels: Sequence[int]) -> DesignCurves:
+        """Return the QE of channels in the exposure."""
+        factors = self.factors[list(channels)]
+        return qe if (factors == 1).all() else qe * factors[:, None]
 
     def same_rates(self, other: Exposure) -> bool:
         """Return whether electrons/s are those of another exposure, but for the sensitivity."""

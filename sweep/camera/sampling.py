@@ -114,15 +114,11 @@ def crosstalk_parts(share: float) -> tuple[tuple[float, int, int], ...]:
 
 
 def with_crosstalk(
-    light: Float[Array, "cases rows columns *batch"], share: float, *, periodic: bool = False
+    light: Float[Array, "cases rows columns *batch"], share: float
 ) -> Float[Array, "cases rows columns *batch"]:
-    """Mix each pixel with its neighbors (see `crosstalk_parts`).
-
-    `periodic`: continue the tile of a uniform field at its other side; else nothing lies beyond the border.
-    """
+    """Mix each pixel with its neighbors (see `crosstalk_parts`); nothing lies beyond the border."""
     rows, columns = light.shape[1:3]
-    border = ((0, 0), (1, 1), (1, 1), *((0, 0),) * (light.ndim - 3))
-    around = np.pad(light, border, mode="wrap" if periodic else "constant")
+    around = np.pad(light, ((0, 0), (1, 1), (1, 1), *((0, 0),) * (light.ndim - 3)))
     mixed = np.zeros(light.shape)
     for part, down, right in crosstalk_parts(share):
         mixed += part * around[:, 1 + down : 1 + down + rows, 1 + right : 1 + right + columns]

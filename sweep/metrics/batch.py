@@ -222,7 +222,7 @@ class Batch:
     def exposure_s(self) -> PerDesign:
         """Exposure time of each design."""
         if self.along is not None and self.along.which.all():
-            return np.full(self.size, self.along.exposure_s)
+            return np.full(self.size, self.along.of.exposure_s)
         return self.model.exposure_s(self.curves)
 
     @cached_property
@@ -246,8 +246,8 @@ class Batch:
             for start in range(0, designs.size, _AT_ONCE):
                 part = slice(start, start + _AT_ONCE)
                 values, dark = along.make(part), along.unlit(part)
-                for case, fixed in enumerate(along.fixed):
-                    of_case = self.setup, self.pairs, dark[:, case], None, fixed, along.channel, values[:, case]
+                for case, fixed in enumerate(along.of.fixed):
+                    of_case = self.setup, self.pairs, dark[:, case], None, fixed, along.of.channel, values[:, case]
                     yield designs[part], slice(case, case + 1), CaseReadings(*of_case)
         rest = np.arange(self.size) if along is None else np.flatnonzero(~along.which)
         if rest.size:

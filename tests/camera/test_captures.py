@@ -228,8 +228,8 @@ def test_qe_and_crosstalk_of_a_photodiode_change_its_electrons() -> None:
         qe=setup.camera.qe * factor[:, None], pixel=setup.camera.pixel.model_copy(update={"crosstalk": 0.1})
     )
     modified = curves * factor[list(setup.camera.modified)][:, None]
-    np.testing.assert_allclose(electrons[1], 0.1 * scene_model(other).pixel_electrons(modified), rtol=1e-12)
-    np.testing.assert_allclose(electrons[0], scene_model(setup).pixel_electrons(curves), rtol=1e-12)
+    np.testing.assert_allclose(electrons[1], 0.1 * scene_model(other).pixel_electrons(modified)[0], rtol=1e-12)
+    np.testing.assert_allclose(electrons[0], scene_model(setup).pixel_electrons(curves)[0], rtol=1e-12)
 
 
 @pytest.mark.parametrize("duty", [0.05, 0.9])
@@ -245,8 +245,8 @@ def test_light_in_windows_is_that_of_all_phases(duty: float) -> None:
     scene = Scene(exposure=FixedExposure(exposure_s=0.011), drive=drive, noise=True)
     setup = chart_setup(scene=scene, pixel=Pixel(captures="staggered", read_noise_e=2))
     corners = phases_of(setup, np.array([0.011]), 0)[0]
-    everywhere = exposure_scales(setup, np.array([0.011]), phases)[:, 0]
-    at_corners = exposure_scales(setup, np.array([0.011]), corners)[:, 0]
+    everywhere = exposure_scales(setup, np.array([0.011]), phases[None])[:, 0]
+    at_corners = exposure_scales(setup, np.array([0.011]), corners[None])[:, 0]
     assert (at_corners.min(axis=1) <= everywhere.min(axis=1) + 1e-12).all()
     assert (at_corners.max(axis=1) >= everywhere.max(axis=1) - 1e-12).all()
     np.testing.assert_allclose(at_corners.min(axis=1), everywhere.min(axis=1), atol=1e-3)

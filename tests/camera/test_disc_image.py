@@ -61,8 +61,8 @@ def test_pixel_means_are_those_of_the_integral(radius_um: float, f_number: float
         np.testing.assert_allclose(found[:, row, column], exact, rtol=0, atol=allowed)
 
 
-def test_pixels_that_are_not_wanted_are_dark_and_sums_are_weighted() -> None:
-    radius_px, pitch_um, rng = 2.0, 2.1, np.random.default_rng(2)
+def test_pixels_that_are_not_wanted_are_dark() -> None:
+    radius_px, pitch_um = 2.0, 2.1
     window = window_around([(0.0, 0.0), (0.25, 0.5)], 3)
     wanted = np.hypot(window.dx, window.dy) < 2.5
     profile = psf.DiscProfile(radius_px * pitch_um, 6 * pitch_um, _VISIBLE_UM, 4.0, 0.0)
@@ -70,8 +70,6 @@ def test_pixels_that_are_not_wanted_are_dark_and_sums_are_weighted() -> None:
     by_pixel = light.by_pixel()
     assert np.all(by_pixel[~wanted] == 0)
     assert np.all(by_pixel[wanted] > 0)
-    weights = rng.uniform(0.0, 1.0, (*wanted.shape, 3)) * (rng.uniform(0.0, 1.0, wanted.shape) < 0.5)[..., None]
-    np.testing.assert_allclose(light.folded(weights), np.einsum("crxn,crxw->cnw", weights, by_pixel), atol=1e-13)
 
 
 def test_defocus_is_the_image_shift() -> None:

@@ -87,9 +87,8 @@ def test_crosstalk_is_a_convolution() -> None:
     rng = np.random.default_rng(2)
     light = rng.uniform(size=(1, 4, 5))
     kernel = np.array([[0, 0.05, 0], [0.05, 0.8, 0.05], [0, 0.05, 0]])
-    for periodic, mode in ((False, "constant"), (True, "wrap")):
-        found = sampling.with_crosstalk(light, 0.2, periodic=periodic)
-        np.testing.assert_allclose(found[0], convolve(light[0], kernel, mode=mode), rtol=1e-12)
+    found = sampling.with_crosstalk(light, 0.2)
+    np.testing.assert_allclose(found[0], convolve(light[0], kernel, mode="constant"), rtol=1e-12)
 
 
 def test_extinction_leaves_two_percent_at_the_visibility() -> None:

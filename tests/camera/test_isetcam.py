@@ -94,7 +94,8 @@ def electrons(cfa: str, mode: str) -> tuple[np.ndarray, dict[str, Any]]:
     run = next(r for r in ref["runs"] if r["cfa"] == cfa and r["mode"] == mode)
     every = Mosaic.from_rows("all", [ref["qe_names"]])
     setup = isetcam_setup(every, ref["skip_magnification"], run["skip_exposure_s"])
-    return next(linear_model(setup).scene.views()).electrons.rates(NOTHING)[0, 0] * run["skip_exposure_s"], run
+    scene = linear_model(setup).scene
+    return scene.own_views[0].rates(NOTHING, scene.exposures[0])[:, 0].T * run["skip_exposure_s"], run
 
 
 @pytest.mark.parametrize("mode", ["fixed", "auto"])
@@ -112,7 +113,7 @@ def test_volts_agree_to_single_precision_and_digital_numbers_are_the_same(
         assert expected.max() < 4095
     # The only difference that is allowed: where ISETCam's ADC saturates at 4096, ours does at 4095.
     np.testing.assert_array_equal(
-        SceneModel(every_channel()).readout.transfer(found)[:, channels], np.minimum(expected, 4095)
+        SceneModel(every_channel()).readout.convert(found)[:, channels], np.minimum(expected, 4095)
     )
 
 

@@ -162,5 +162,5 @@ def test_plans_that_compute_the_same_have_one_key() -> None:
 def test_no_pixel_is_brighter_than_the_brightest(made: DesignScene) -> None:
     model = SceneModel(replace(made.setup, left_out=frozenset({"quantization", "noise"})))
     electrons = model.pixel_electrons(made.curves)
-    assert electrons.shape[2] == len(lights().names)
+    assert electrons.shape[3] == len(lights().names)
     assert electrons.max() * made.setup.camera.pixel.dn_per_e <= made.box.brightest_pixel_dn * (1 + 1e-9)

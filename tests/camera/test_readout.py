@@ -64,7 +64,7 @@ def test_a_whole_pedestal_cancels_to_the_last_digit() -> None:
     steps = np.arange(1, 41) + 0.5
     electrons = np.concatenate([np.nextafter(steps, 0), steps, np.nextafter(steps, 99)])
     with_it, without = (
-        SceneModel(scene("one", "RGGB", {}, deep | more).setup).readout.transfer(electrons)
+        SceneModel(scene("one", "RGGB", {}, deep | more).setup).readout.convert(electrons)
         for more in ({"offset_dn": 4_000_000.0}, {})
     )
     np.testing.assert_array_equal(with_it - without, 4_000_000.0)
@@ -78,4 +78,4 @@ def test_whole_numbers_without_noise() -> None:
     made = scene("one", "RGGB", {}, {"well_e": 9000.0, "gain_dn_per_e": 0.5, "offset_dn": 3.25}).setup
     electrons = np.linspace(0, 10_000, 100_001)
     expected = np.minimum(np.floor(np.minimum(electrons, (4095 - 3.25) / 0.5) * 0.5 + 3.25 + 0.5), 4095)
-    np.testing.assert_array_equal(SceneModel(made).readout.transfer(electrons), expected)
+    np.testing.assert_array_equal(SceneModel(made).readout.convert(electrons), expected)

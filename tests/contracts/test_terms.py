@@ -48,7 +48,7 @@ ROAD = {
 
 def unlit(**scene: Any) -> np.ndarray:
     model, setup = model_of(**ROAD, **scene)
-    return np.asarray(next(model.views()).electrons.unlit(np.empty((1, 0, setup.camera.grid.size))))
+    return np.asarray(model.own_views[0].unlit(np.empty((1, 0, setup.camera.grid.size)), model.exposures[0]))
 
 
 def test_the_background_is_not_dimmed_by_air() -> None:

@@ -68,7 +68,7 @@ def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
     edges = edges_of(crossed, 0, crossed.size)
     assert edges is not None
     imager = SceneModel(VIEWS["chart"])
-    changing = imager.changing(edges)
+    changing = imager.along(edges)
     assert changing is not None
     found, dense = evaluate(imager, edges), evaluate(imager, edges.curves())
     brighter = trapezoid(edges.curves()[:, 0]) > trapezoid(SENSOR.qe["Y"])
@@ -79,7 +79,7 @@ def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
     assert_within_rounding(
         "csd_yellow_red", found["csd_yellow_red"], dense["csd_yellow_red"], imager.setup, magnitude_dn
     )
-    every = imager.changing(edges.subset(np.flatnonzero(brighter)))
+    every = imager.along(edges.subset(np.flatnonzero(brighter)))
     assert every is None
 
 

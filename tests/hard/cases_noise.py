@@ -164,7 +164,7 @@ def a_blinding_signal() -> Result:
         allowed.append((12.8 * wide + 177 * 0.5) * 5 / 384 / 32**4)
     model = chain(pixel)
     for brightest in (2e4, 1e8, 1e12, 1e100, 1e300, np.inf):
-        found = model.readout.transfer(np.append(electrons, brightest))[:-1]
+        found = model.readout.convert(np.append(electrons, brightest))[:-1]
         results += [(abs(float(f - e)), a) for f, e, a in zip(found, exact, allowed, strict=True)]
     return worst(results)
 
@@ -232,7 +232,7 @@ def all_clipped() -> Result:
     """
     model = chain(Pixel())
     electrons = np.array([1e8, 2e8, 1e14, 1e100, 1e300, np.inf])
-    found = model.readout.transfer(electrons)
+    found = model.readout.convert(electrons)
     spread = float(np.ptp(found) + pixel_law(Pixel()).at(0, electrons, 2)[1].max())
     return worst([(spread, 1e-20 * 4095), (float(np.abs(found - 4095).max()), EPS * 4095)])
 

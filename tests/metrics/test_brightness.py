@@ -22,7 +22,7 @@ from sweep.study import Study, load_study
 from ..hard import random_scenes
 from ..hard.scenes import scene, target
 from ..margin import near_squared_dprime
-from ..readout_oracle import channels_of
+from ..readout_oracle import pixels_of
 
 PAIR = ("yellow", "red")
 _BASINS = 16
@@ -92,11 +92,11 @@ class Lamps:
             for cd in (setup.scene.intensity_cd, 2 * setup.scene.intensity_cd)
             for left_out in [frozenset() if self.noisy else frozenset({"quantization"})]
         ]
-        once, twice = (model.pixel_electrons(curves)[..., 0, 0, :, :] for model in models)
+        (once, self.weights, self.light), (twice, _, _) = (pixels_of(model, curves, 0) for model in models)
+        once, twice = (
+            electrons[:, 0] if setup.camera.pixel.captures else electrons[0, 0] for electrons in (once, twice)
+        )
         self.lit, self.dark, self.model = twice - once, 2 * once - twice, models[0]
-        self.weights = channels_of(self.model.readout, np.eye(once.shape[-1]), 0)
-        readout = self.model.readout
-        self.light = readout.of_pixels(readout.capture_light)
 
     def read(self, signals: np.ndarray, factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and variance of the channels, [n_signals, n_factors, n_channels]."""

@@ -135,12 +135,11 @@ def test_where_exact_sums_are_too_many_the_noise_is_gaussian(tmp_path: Path) -> 
     study = load_study(path)
     imager = SceneModel(study.setup(study.spaces[0], "dim"))
     curves = np.empty((1, 0, study.grid.size))
-    assert confusion.few_pixels(imager.setup.scene, imager.setup.camera.pixel, imager.setup.camera.mosaic) is None
-    tile = imager.setup.camera.mosaic.indices.ravel()
-    own = [np.flatnonzero(tile == at) for at in range(tile.max() + 1)]
+    assert confusion.few_pixels(imager.setup.scene, imager.setup.camera.pixel, imager.setup.camera.mosaic) is False
+    own = imager.own_views[0].image.pixels_of_channels()
     found = evaluate(imager, curves, ["yellow", "red"])
     members = {name: imager.setup.members[name] for name in ("yellow", "red")}
-    summed_up = confusion.errors(imager.pixel_electrons(curves)[:, 0], own, imager.readout.pixel, members)
+    summed_up = confusion.errors(imager.pixel_electrons(curves)[0, :, 0], own, imager.readout.pixel, members)
     error = summed_up["yellow", "red"]
     assert error > 1e-9, error
     assert error / _FACTOR <= found["error_yellow_red"] <= 2 * error

@@ -13,7 +13,7 @@ from sweep.study import load_study
 
 from ..draws import draws_dn
 from ..hard.scenes import DARK, F2, FAR, FIXED, DesignScene, scene
-from ..readout_oracle import channels_of
+from ..readout_oracle import pixels_of
 
 NOISY = (
     scene("patch, crosstalk", "quad", {"noise": True}, DARK | {"crosstalk": 0.1}),
@@ -34,15 +34,14 @@ def test_mean_and_variance_of_the_readout_agree_with_draws_of_every_pixel(made: 
     read = model.read_with_noise(made.curves)
     mean, variance = read.mean, read.variance
     np.testing.assert_array_equal(mean, SceneModel(made.setup).read(made.curves)[0])
-    electrons = model.pixel_electrons(made.curves)[0]
-    per_place = len(electrons) // model.n_cases
     draws, rng = 20_000, np.random.default_rng(7)
-    for case in {0, len(electrons) - 1}:
+    per_place = mean.shape[1] // model.n_cases
+    for case in {0, mean.shape[1] - 1}:
+        electrons, weights, _ = pixels_of(model, made.curves, case // per_place)
+        of_signals = electrons[0, case % per_place]
         for signal in (0, len(made.setup.lights.names) - 1):
-            pixels = draws_dn(
-                np.broadcast_to(electrons[case, signal], (draws, electrons.shape[2])), model.readout.pixel, rng
-            )
-            values = channels_of(model.readout, pixels, case // per_place)
+            every = np.broadcast_to(of_signals[signal], (draws, of_signals.shape[1]))
+            values = draws_dn(every, model.readout.pixel, rng) @ weights
             # 4 sigma of the mean and, by the fourth moment, of the variance.
             off = 4 * values.std(axis=0) / draws**0.5
             np.testing.assert_array_less(np.abs(values.mean(axis=0) - mean[0, case, signal]), off + 1e-9)

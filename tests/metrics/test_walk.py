@@ -58,7 +58,7 @@ def curves_in(name: str, scenario: str, cfa: str = "RGGB") -> tuple[list[Brightn
 def test_bounds_between_two_brightnesses_hold(name: str) -> None:
     random = np.random.default_rng(3)
     lamps = curves_in(name, "")[0][0].lamps
-    n_channels, slopes = lamps.readout.weights.shape[2], np.empty((4, lamps.readout.weights.shape[2]))
+    n_channels, slopes = lamps.weights.shape[1], np.empty((4, lamps.weights.shape[1]))
     for lamp in random.integers(lamps.n_signals, size=12):
         low, high = np.sort(np.exp(random.uniform(-8, 8, 2)))
         factors = np.linspace(low, high, 400)

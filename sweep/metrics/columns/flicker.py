@@ -6,8 +6,9 @@ import numpy as np
 
 from ...base.types import Array, Float
 from ...camera.brightness import LampReadings
+from ...camera.light import Light
 from ...camera.model import scene_model
-from ...camera.pwm import exposure_scales, phases_of
+from ...camera.pwm import phases_of
 from ...camera.setup import Setup
 from ..batch import Batch
 from ..chromatic import squared_distance
@@ -65,17 +66,18 @@ class Flicker(Metric):
         setup, rows = batch.setup, []
         if setup.scene.drive is None or not setup.camera.pixel.captures:
             return {}
+        steady, light = scene_model(setup.steady), batch.model.light
         for design, time_s in zip(batch.curves, batch.exposure_s, strict=True):
-            rows.append([_of_lamps(lamps, setup, time_s) for lamps in scene_model(setup.steady).lamps(design[None])])
+            rows.append([_of_lamps(lamps, setup, light, time_s) for lamps in steady.lamps(design[None])])
         worst = {MODULATION: max, LAMP_SEEN: min, FALSE_HUE: max}
         return {name: np.array([of(place[name] for place in row) for row in rows]) for name, of in worst.items()}
 
 
-def _of_lamps(lamps: LampReadings, setup: Setup, time_s: float) -> dict[str, float]:
+def _of_lamps(lamps: LampReadings, setup: Setup, light: Light, time_s: float) -> dict[str, float]:
     """Return the columns at one sampling phase and field position, with the largest hue refined between the phases."""
 
     def lit(phases: Float[Array, " phases"]) -> Float[Array, "phases signals channels"]:
-        scales = exposure_scales(setup, np.array([time_s]), phases)[:, 0]
+        scales = light.scales(np.array([time_s]), phases)[:, 0]
         return np.asarray(lamps.means_of_exposures(scales) - dark, dtype=float)
 
     dark = lamps.means_of_exposures(np.zeros((len(lamps.lit_e), 1)))
