@@ -11,6 +11,7 @@ from scipy.stats import poisson
 from sweep.camera.image import Pixels
 from sweep.camera.model import SceneModel
 from sweep.camera.pixel import Pixel
+from sweep.camera.readout import light_of_elements
 
 
 def digital_numbers(electrons: float, pixel: Pixel) -> tuple[np.ndarray, np.ndarray]:
@@ -55,7 +56,11 @@ def pixels_of(model: SceneModel, curves: np.ndarray, place: int) -> tuple[np.nda
         used = np.concatenate(view.image.pixels_of_channels())
         weight = 1 / np.repeat(view.image.counts, view.image.counts)
     of_channel = view.image.channel[used][:, None] == np.arange(view.image.n_channels)
-    return electrons[:, 0][..., used], of_channel * weight[:, None], view.capture_light(model.exposures)[:, used]
+    return (
+        electrons[:, 0][..., used],
+        of_channel * weight[:, None],
+        light_of_elements(model.exposures, view.image.channel)[:, used],
+    )
 
 
 def moments(electrons: float, pixel: Pixel) -> tuple[float, float]:

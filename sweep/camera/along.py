@@ -47,7 +47,7 @@ class Along:
         dark = np.concatenate([view.unlit(nothing, exposure) for view in views])
         self.dark_e = (dark * self.exposure_s).reshape(-1, n)
         electrons = (rest + dark) * self.exposure_s
-        fixed = readout.mean(electrons[None], np.ones((1, len(rest))))
+        fixed = readout.mean(electrons[None], np.zeros(len(rest), dtype=np.intp))
         self.fixed = np.swapaxes(fixed.reshape(-1, n, fixed.shape[1]), 1, 2)
 
     @staticmethod
@@ -99,7 +99,7 @@ class AlongReadings:
         electrons *= self.of.exposure_s
         electrons += own[..., None]
         flat = electrons.reshape(1, -1, n_signals)
-        return self.of.readout.mean(flat, np.ones(flat.shape[:2])).reshape(electrons.shape)
+        return self.of.readout.mean(flat, np.zeros(flat.shape[1], dtype=np.intp)).reshape(electrons.shape)
 
     def unlit(self, part: slice) -> Float[Array, "_designs cases channels"]:
         """Return the readings of all channels without lamps, unquantized, DN."""

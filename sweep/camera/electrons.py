@@ -10,7 +10,7 @@ import numpy as np
 from ..base.types import Array, DesignCurves, Float, IndexArray, Int
 from .image import Image
 from .place import Position
-from .readout import CaptureLight, Exposure
+from .readout import Exposure
 from .setup import Setup
 
 Lit = Float[Array, "elements designs signals"]
@@ -66,7 +66,3 @@ class View:
     def unlit(self, curves: DesignCurves, exposure: Exposure) -> Dark:
         """Return electrons/s without lamps: of the background, and dark current."""
         return self.background(curves, self.setup.camera.modified, exposure) + self.fixed(exposure)[1]
-
-    def capture_light(self, exposures: Sequence[Exposure]) -> CaptureLight:
-        """Return the light of exposures on the elements, relative to a pixel of full sensitivity."""
-        return np.stack([exposure.light * exposure.factors[self.image.channel] for exposure in exposures])

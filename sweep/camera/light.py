@@ -86,7 +86,7 @@ Light = Steady | Pulsed
 def light_of(setup: Setup) -> Light:
     """Return the light of a scene in the exposures of its pixel."""
     if setup.scene.drive is None or not setup.computes("flicker"):
-        return Steady(max(1, len(setup.camera.pixel.exposures)))
+        return Steady(len(setup.camera.pixel.exposures) if setup.camera.pixel.captures else 1)
     clips = setup.computes("saturation") and setup.accuracy.finest_phase_px > 0
     rounds = setup.scene.noise is None and setup.computes("quantization")
     bends = not setup.linear and (not rounds or clips)

@@ -18,7 +18,7 @@ from .exposure import relative_slope
 from .model import SceneModel
 from .noise.law import STEPS_DN2, groups_of, pixel_law
 from .pixel import unquantized
-from .readout import CaptureLight, exposures_of
+from .readout import CaptureLight, exposures_of, light_of_elements
 from .setup import READOUT, Setup
 
 _FIELD_POSITIONS = 9
@@ -111,7 +111,8 @@ class LinearModel:
 
     def _capture_light(self, view: View) -> CaptureLight:
         """Return the light of the exposures of the pixel itself."""
-        return view.capture_light(exposures_of(self.setup.with_camera(pixel=self.hdr or self.pixel)))
+        exposures = exposures_of(self.setup.with_camera(pixel=self.hdr or self.pixel))
+        return light_of_elements(exposures, view.image.channel)
 
     @cached_property
     def linear_over_brightness(self) -> bool:

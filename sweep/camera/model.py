@@ -26,7 +26,7 @@ from .field import field_heights, scene_at
 from .light import Steady, alike, different, light_of
 from .phases import Phases, different_phases, scene_phases
 from .pixel import unquantized
-from .readout import NoisyReadout, exposures_of, is_noisy, readout_of, whole_exposure
+from .readout import NoisyReadout, exposures_of, is_noisy, light_of_elements, readout_of, whole_exposure
 from .setup import Setup
 
 _BLOCK = 2_000_000
@@ -42,10 +42,9 @@ class SceneModel:
         self.phases: Phases | None = None
         if setup.scene.target is not None:
             self.phases = different_phases(setup, scene_phases(setup))[0]
-        self.exposures, self.light, self.readout = exposures_of(setup), light_of(setup), readout_of(setup)
+        self.exposures, self.light = exposures_of(setup), light_of(setup)
+        self.readout = readout_of(setup, self.exposures)
         self._whole = whole_exposure(setup) if setup.camera.pixel.captures else self.exposures[0]
-        exposures = list(enumerate(self.exposures))
-        self._same_as = [next(at for at, of in exposures if of.same_rates(exposure)) for exposure in self.exposures]
         self._positions: dict[float, place.Position] = {}
         self._moments: Float[Array, " moments"] | None = None
         self.n_cases = len(self.heights) * (1 if self.phases is None else len(self.phases))
@@ -127,11 +126,10 @@ class SceneModel:
         first, which = different(scales)
         parts = []
         for view in self.own_views:
-            light, blocks = (
-                view.capture_light(self.exposures),
-                self._blocks(view, curves, scales[..., first], exposure_s),
-            )
-            parts.append(_by_design([view.image.folded(self.readout.mean(each, light)) for each in blocks]))
+            channel, parts_of = view.image.channel, list[Float[Array, "places channels designs moments signals"]]()
+            for electrons in self._blocks(view, curves, scales[..., first], exposure_s):
+                parts_of.append(view.image.folded(self.readout.mean(electrons, channel)))
+            parts.append(_by_design(parts_of))
         dn = np.concatenate(parts, axis=1)
         return dn[:, np.arange(dn.shape[1]).reshape(-1, first.size)[:, which].ravel()], exposure_s
 
@@ -143,9 +141,9 @@ class SceneModel:
         exposure_s = self.exposure_s(curves)
         scales, means, variances = self.scales(exposure_s), [], []
         for view in self.own_views:
-            light, read = view.capture_light(self.exposures), []
+            read = []
             for electrons in self._blocks(view, curves, scales, exposure_s):
-                mean, variance = self.readout.moments(electrons, light)
+                mean, variance = self.readout.moments(electrons, view.image.channel)
                 read.append((view.image.folded(mean), view.image.spread(variance)))
             means.append(_by_design([mean for mean, _ in read]))
             variances.append(_by_design([variance for _, variance in read]))
@@ -168,9 +166,9 @@ class SceneModel:
         """Return expected electrons of the lamps with the mean light of their pulses, and without lamps."""
         lit, dark = list[Lit](), list[Dark]()
         for at, exposure in enumerate(self.exposures):
-            same = self._same_as[at]
-            lit.append(lit[same] if same < at else view.rates(curves, exposure))
-            dark.append(dark[same] if same < at else view.unlit(curves, exposure))
+            known = exposure.same_as < at
+            lit.append(lit[exposure.same_as] if known else view.rates(curves, exposure))
+            dark.append(dark[exposure.same_as] if known else view.unlit(curves, exposure))
         times = np.array([exposure.light for exposure in self.exposures])[:, None] * exposure_s
         lit_e, dark_e = np.stack(lit), np.stack(dark)
         lit_e *= times[:, None, :, None]
@@ -207,7 +205,8 @@ class SceneModel:
         scales, case = self.scales(exposure_s), 0
         moments, readout, noisy = alike(scales), self.readout, is_noisy(self.setup)
         for view in self.own_views:
-            light, (lit, dark) = view.capture_light(self.exposures), self._electrons(view, curves, exposure_s)
+            light = light_of_elements(self.exposures, view.image.channel)
+            lit, dark = self._electrons(view, curves, exposure_s)
             lit_e, dark_e = np.swapaxes(lit[:, :, 0], 1, 2), dark[..., 0]
             for of_case in range(view.image.n_cases):
                 used, weights, spread, n_pixels = view.image.of_case(of_case)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.types import Array, DesignCurves, Float, PerChannel, PerDesign, SameShape
+from ..base.types import Array, DesignCurves, Float, IndexArray, Int, PerChannel, PerDesign, SameShape
 from .noise import merge
 from .noise.law import groups_of, pixel_law, read_once_law
 from .noise.rounding import rounded
@@ -18,6 +18,8 @@ from .setup import Setup
 _CERTAIN_DN2 = 1e-9
 Electrons = Float[Array, "exposures elements *batch"]
 """Expected electrons in each exposure of a pixel; one that is read once has one."""
+Channel = Int[IndexArray, " elements"]
+"""Channel of each element."""
 CaptureLight = Float[Array, "exposures elements"]
 """Light of the exposures of elements, relative to a pixel of full sensitivity."""
 Numbers = Float[Array, "elements *batch"]
@@ -28,21 +30,19 @@ Numbers = Float[Array, "elements *batch"]
 class Exposure:
     """Electrons that a pixel collects at a time.
 
-    `light`: relative to a pixel of full sensitivity in the scene's exposure time; `factors`: on the QE of the channels.
+    `light`: relative to a pixel of full sensitivity in the scene's exposure time; `factors`: on the QE of the channels;
+    `same_as`: number of the first exposure with the same electrons/s, but for the sensitivity.
     """
 
     light: float
     factors: PerChannel
     crosstalk: float
+    same_as: int = 0
 
     def seen(self, qe: DesignCurves, channels: Sequence[int]) -> DesignCurves:
         """Return the QE of channels in the exposure."""
         factors = self.factors[list(channels)]
         return qe if (factors == 1).all() else qe * factors[:, None]
-
-    def same_rates(self, other: Exposure) -> bool:
-        """Return whether electrons/s are those of another exposure, but for the sensitivity."""
-        return self.crosstalk == other.crosstalk and bool((self.factors == other.factors).all())
 
 
 def whole_exposure(setup: Setup) -> Exposure:
@@ -52,12 +52,22 @@ def whole_exposure(setup: Setup) -> Exposure:
 
 def exposures_of(setup: Setup) -> list[Exposure]:
     """Return the exposures of a scene's pixel."""
-    whole, channels, exposures = whole_exposure(setup), setup.camera.mosaic.channels, []
+    whole, exposures = whole_exposure(setup), list[Exposure]()
+    if not setup.camera.pixel.captures:
+        return [whole]
     for capture, _ in setup.camera.pixel.exposures:
-        factors = np.array([capture.qe_factor.get(channel, 1.0) for channel in channels])
-        crosstalk = whole.crosstalk if capture.crosstalk is None else capture.crosstalk
-        exposures.append(Exposure(capture.light, factors, crosstalk if whole.crosstalk else 0.0))
-    return exposures or [whole]
+        factors = np.array([capture.qe_factor.get(channel, 1.0) for channel in setup.camera.mosaic.channels])
+        crosstalk = whole.crosstalk
+        if crosstalk and capture.crosstalk is not None:
+            crosstalk = capture.crosstalk
+        same = [of.same_as for of in exposures if of.crosstalk == crosstalk and (of.factors == factors).all()]
+        exposures.append(Exposure(capture.light, factors, crosstalk, same[0] if same else len(exposures)))
+    return exposures
+
+
+def light_of_elements(exposures: Sequence[Exposure], channel: Channel) -> CaptureLight:
+    """Return the light of exposures on elements, relative to a pixel of full sensitivity."""
+    return np.stack([exposure.light * exposure.factors[channel] for exposure in exposures])
 
 
 @dataclass(frozen=True)
@@ -80,11 +90,11 @@ class ReadOnce:
     convert: Callable[[SameShape], SameShape]
     proportional = True
 
-    def mean(self, electrons: Electrons, light: CaptureLight) -> Numbers:  # noqa: ARG002
+    def mean(self, electrons: Electrons, channel: Channel) -> Numbers:  # noqa: ARG002
         """Return digital numbers; under noise their means."""
         return self.convert(electrons[0])
 
-    def moments(self, electrons: Electrons, light: CaptureLight) -> tuple[Numbers, Numbers]:  # noqa: ARG002
+    def moments(self, electrons: Electrons, channel: Channel) -> tuple[Numbers, Numbers]:  # noqa: ARG002
         """Return means and variances."""
         dn, variance_dn = read_once_law(self.pixel).at(0, electrons[0], 2)
         # A digital number that is the same in all but one of a billion readouts: what is left of its noise is
@@ -101,18 +111,20 @@ class Merged:
     """
 
     pixel: Pixel
+    exposures: Sequence[Exposure]
     noisy: bool
     proportional: bool
 
-    def mean(self, electrons: Electrons, light: CaptureLight) -> Numbers:
+    def mean(self, electrons: Electrons, channel: Channel) -> Numbers:
         """Return digital numbers; under noise their means."""
+        light = light_of_elements(self.exposures, channel)
         if self.noisy:
             return self._moments(electrons, light, 1)[0]
         return merge.without_noise(electrons, _beside(light, electrons), self.pixel)
 
-    def moments(self, electrons: Electrons, light: CaptureLight) -> tuple[Numbers, Numbers]:
+    def moments(self, electrons: Electrons, channel: Channel) -> tuple[Numbers, Numbers]:
         """Return means and variances."""
-        mean, variance = self._moments(electrons, light, 2)
+        mean, variance = self._moments(electrons, light_of_elements(self.exposures, channel), 2)
         return mean, variance
 
     def _moments(self, electrons: Electrons, light: CaptureLight, rows: int) -> Sequence[Numbers]:
@@ -135,11 +147,11 @@ def _beside(light: CaptureLight, electrons: Electrons) -> Float[Array, "exposure
 Readout = ReadOnce | Merged
 
 
-def readout_of(setup: Setup) -> Readout:
+def readout_of(setup: Setup, exposures: Sequence[Exposure]) -> Readout:
     """Return how the pixel of a scene is read."""
     pixel, noisy = setup.camera.pixel, setup.scene.noise is not None
     if pixel.captures:
-        return Merged(pixel, noisy, _proportional(setup))
+        return Merged(pixel, exposures, noisy, _proportional(setup, exposures))
     clips, rounds = setup.computes("saturation"), setup.computes("quantization")
     most_e = pixel.saturation_e if clips else np.inf
 
@@ -163,9 +175,9 @@ def readout_of(setup: Setup) -> Readout:
     return ReadOnce(pixel, held)
 
 
-def _proportional(setup: Setup) -> bool:
+def _proportional(setup: Setup, exposures: Sequence[Exposure]) -> bool:
     """Return whether all exposures of an HDR pixel have their fixed share of the electrons."""
-    exposures, pixel = exposures_of(setup), setup.camera.pixel
+    pixel = setup.camera.pixel
     windows = {(capture.start_ratio, capture.exposure_ratio) for capture, _ in pixel.exposures}
     pulsed = setup.scene.drive is not None and setup.computes("flicker")
     if len({exposure.crosstalk for exposure in exposures}) > 1 or (pulsed and len(windows) > 1):

@@ -23,7 +23,7 @@ from ..base.types import (
     PerDesign,
 )
 from ..camera.along import AlongReadings
-from ..camera.brightness import LampReadings
+from ..camera.brightness import LampReadings, room_dn, room_of
 from ..camera.model import SceneModel, scene_model
 from ..camera.readout import NoisyReadout
 from ..camera.setup import Setup
@@ -33,7 +33,7 @@ from ..spectra.lights import Pair, class_pairs
 from ..vision.section import SeededVision
 from .brightness import Walk, curves_of
 from .quantity import Columns
-from .separation import pixel_roots
+from .separation import MANY, pixel_roots
 
 _AT_ONCE = 1024
 """Designs that differ in one channel alone, or readouts of a design in a case, that are looked at at once."""
@@ -69,6 +69,19 @@ class CaseReadings:
         whole = np.repeat(self.fixed[None], len(self.values), axis=0)
         whole[..., self.channel] = self.values
         return whole
+
+    @cached_property
+    def room_dn(self) -> PerDesign:
+        """Chromatic distance up to which the closed form holds, DN."""
+        if self.whole is not None:
+            return room_dn(self.setup, self.whole, self.dark)
+        assert self.fixed is not None
+        assert self.values is not None
+        others, dark = np.delete(self.fixed, self.channel, axis=1), self.dark[:, self.channel]
+        lit = np.delete(self.fixed - self.dark[0], self.channel, axis=1).max(axis=1, initial=-np.inf)
+        most_dn = np.maximum(self.values.max(axis=1), others.max(initial=-np.inf))
+        least_dn = np.maximum(self.values - dark[:, None], lit).min(axis=1)
+        return room_of(self.setup, most_dn, least_dn, self.dark.min(axis=1), self.dark.max(axis=1))
 
     def times(self, factors: PerChannel) -> CaseReadings:
         """Return the readings with each channel multiplied."""
@@ -216,7 +229,7 @@ class Batch:
     @cached_property
     def along(self) -> AlongReadings | None:
         """Readings of the designs that differ in one channel alone."""
-        return None if self.noisy else self.model.along(self.block)
+        return None if self.noisy or self.size < MANY else self.model.along(self.block)
 
     @cached_property
     def exposure_s(self) -> PerDesign:

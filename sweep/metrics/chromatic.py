@@ -22,7 +22,7 @@ from ..spectra.lights import Pair, class_pairs
 from .brightness import EXACT, BrightnessCurves
 from .complex_step import Smooth
 from .discrimination import dprime
-from .separation import MANY, MOST_CHANNELS, packed_response, pair_blocks, pair_order
+from .separation import MOST_CHANNELS, packed_response, pair_blocks, pair_order
 from .smooth import Rows, SmoothDesign
 
 _ROUNDED = 1 - 1e-9
@@ -102,31 +102,26 @@ def chromatic_along(
     unlit: Float[Array, "designs channels"],
     members: Mapping[str, MemberNumbers],
     pairs: Sequence[Pair],
-) -> tuple[dict[Pair, PerDesign], PerDesign, PerDesign]:
+) -> dict[Pair, PerDesign]:
     """Compute the smallest chromatic distance of pairs for designs that differ in one channel alone, DN.
 
     `fixed`: shared channels, DN, whose response without lamps is the same, too; `values`: values of that channel, DN;
-    `unlit`: without lamps, DN. Returns distances, largest reading, and that of the fullest channel of the darkest lamp
-    alone, DN.
+    `unlit`: without lamps, DN.
     """
     shared = np.delete(fixed - unlit[0], channel, axis=1)
     finite = np.isfinite(values).all() and np.isfinite(shared).all()
-    if len(values) < MANY or fixed.shape[1] > MOST_CHANNELS or not finite:
+    if fixed.shape[1] > MOST_CHANNELS or not finite:
         response = np.repeat(fixed[None], len(values), axis=0)
         response[..., channel] = values
-        lit = response - unlit[:, None]
-        distances = {(a, b): chromatic_separation(lit, members[a], members[b]) for a, b in pairs}
-        return distances, response.max(axis=(1, 2)), lit.max(axis=2).min(axis=1)
+        return {(a, b): chromatic_separation(response - unlit[:, None], members[a], members[b]) for a, b in pairs}
     from .separation_kernels import nearest_chromatic_along  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     padded = np.zeros((len(fixed), MOST_CHANNELS - 1))
     padded[:, : shared.shape[1]] = shared
     order, squared = pair_order(_least, padded, members, pairs), np.empty((len(pairs), len(values)))
-    of_pairs, (most_dn, least_dn) = (order.first, order.second, order.starts, order.least), np.empty((2, len(values)))
-    dark = np.ascontiguousarray(unlit[:, channel])
-    nearest_chromatic_along(np.ascontiguousarray(values), dark, padded, *of_pairs, squared, most_dn, least_dn)
-    most_dn = np.maximum(most_dn, np.delete(fixed, channel, axis=1).max(initial=-np.inf))
-    return dict(zip(pairs, np.sqrt(squared), strict=True)), most_dn, least_dn
+    of_pairs, dark = (order.first, order.second, order.starts, order.least), np.ascontiguousarray(unlit[:, channel])
+    nearest_chromatic_along(np.ascontiguousarray(values), dark, padded, *of_pairs, squared)
+    return dict(zip(pairs, np.sqrt(squared), strict=True))
 
 
 def _least(first: Float[Array, "pairs channels"], second: Float[Array, "pairs channels"]) -> Float[Array, " pairs"]:

@@ -24,7 +24,7 @@ from .columns.confusion import D_PRIME, ERROR, STATE_ERROR
 from .columns.exposure import EXPOSURE
 from .columns.pixel_separation import CHROMATIC_PIXEL_CSD
 from .columns.user import UserColumns
-from .metric import Metric
+from .metric import Metric, Need
 from .places import Sought, can_refine, over_cases, refine
 from .quantity import Columns, Quantity, RequestedQuantities
 from .registry import METRICS, quantities_of
@@ -65,10 +65,11 @@ def evaluate(
     """
     block = _block(designs)
     pairs = class_pairs(model.setup.lights.classes) if chromatic is None else chromatic
-    needs = {metric.needs for metric in metrics} if states else set()
+    has = _available(model.setup, states, points, images)
+    others = [of for of in metrics if of.needs in has and not isinstance(of, ColorSeparation | UserColumns)]
+    needs = {of.needs for of in others}
     wanted = "noise" in needs, "any brightness" in needs
     batch = Batch(model, block, states, tuple(pairs), family, points, images, *wanted)
-    others = [metric for metric in metrics if not isinstance(metric, ColorSeparation | UserColumns)]
     of_readings = [_CSD, *others, *map(UserColumns, user_metrics)]
     requested = RequestedQuantities(
         model.setup.lights.classes, tuple(states), any_place=True, user_metrics=tuple(user_metrics)
@@ -158,8 +159,28 @@ def evaluate_some(
 
 def designed_quantities(setup: Setup, designs: DesignCurves | Block, metrics: Collection[Metric] = METRICS) -> Columns:
     """Return the quantities of designs without light."""
-    batch = Batch(SceneModel(setup), _block(designs))
-    return _of_batch(batch, [metric for metric in metrics if metric.needs == "filters"])
+    has = _available(setup) - {"readings"}
+    return _of_batch(Batch(SceneModel(setup), _block(designs)), [metric for metric in metrics if metric.needs in has])
+
+
+def _available(
+    setup: Setup,
+    states: Sequence[str] = (),
+    points: DesignParameters | None = None,
+    images: SeededVision | None = None,
+) -> set[Need]:
+    """Return what metrics may be computed from."""
+    needs: dict[Need, bool] = {
+        "readings": True,
+        "filters": True,
+        "noise": bool(states),
+        "any brightness": bool(states),
+        "pulses": setup.scene.drive is not None and bool(setup.camera.pixel.captures),
+        "tasks": setup.tasks is not None,
+        "parameters": points is not None,
+        "images": images is not None,
+    }
+    return {need for need, available in needs.items() if available}
 
 
 def _of_batch(batch: Batch, metrics: Collection[Metric]) -> Columns:

@@ -9,6 +9,8 @@ from typing import ClassVar, Literal
 from .batch import Batch, CaseReadings
 from .quantity import Columns, Quantity, RequestedQuantities
 
+Need = Literal["readings", "noise", "any brightness", "pulses", "filters", "tasks", "parameters", "images"]
+
 
 class Metric(ABC):
     """Columns that are computed together; a class in `metrics/columns/`.
@@ -19,9 +21,7 @@ class Metric(ABC):
     """
 
     order: ClassVar[int] = 99
-    needs: ClassVar[Literal["readings", "noise", "any brightness", "pulses", "filters", "parameters", "images"]] = (
-        "readings"
-    )
+    needs: ClassVar[Need] = "readings"
 
     @abstractmethod
     def quantities(self, requested: RequestedQuantities) -> Sequence[Quantity]:

@@ -29,7 +29,7 @@ from ..spectra.lights import Pair, class_pairs, pair_name
 _BLOCK_PAIRS = 262_144
 """Pair distances held at once per channel: 2 MiB, so that a block stays in cache."""
 MANY, MOST_CHANNELS = 64, 4
-"""From so many designs of so few channels on, the compiled pass saves more time than it takes to load."""
+"""From so many designs of so few channels on, compiled passes save more time than they take to load."""
 _LARGEST = 1e140
 """Larger distances, and those below its inverse, are scaled before they are squared, DN."""
 
@@ -126,16 +126,11 @@ def separations_along(
     others, pairs = np.delete(fixed, channel, axis=1), class_pairs(list(members))
     odd = np.asarray(~np.isfinite(values).all(axis=1) | (not np.isfinite(others).all()))
     order = pair_order(_squared, others, members, pairs)
-    if len(values) < MANY:
-        with np.errstate(invalid="ignore", over="ignore"):
-            squares = order.least + (values[:, order.first] - values[:, order.second]) ** 2
-        squared = np.minimum.reduceat(squares, order.starts[:-1], axis=1).T
-    else:
-        from .separation_kernels import nearest_along_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .separation_kernels import nearest_along_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-        squared = np.empty((len(pairs), len(values)))
-        of_pairs = order.least, order.first, order.second, order.starts
-        nearest_along_squared(np.ascontiguousarray(values), *of_pairs, squared)
+    squared = np.empty((len(pairs), len(values)))
+    of_pairs = order.least, order.first, order.second, order.starts
+    nearest_along_squared(np.ascontiguousarray(values), *of_pairs, squared)
 
     def all_channels(designs: Bool[BoolArray, " values"]) -> DesignSignals:
         response = np.repeat(fixed[None], int(designs.sum()), axis=0)

@@ -168,30 +168,23 @@ def nearest_chromatic_along(
     starts: IndexArray,
     least: FloatArray,
     out: FloatArray,
-    most_dn: FloatArray,
-    least_dn: FloatArray,
 ) -> None:
     """As `nearest_along_squared`, of the chromatic distance (see `chromatic.squared_distance`).
 
     `dark`: the channel without lamps; `others`: the three shared channels less their response without lamps, missing
-    ones 0; `least`: what no squared distance of a pair is below. Ratios are compared without a division. `most_dn` and
-    `least_dn` become the largest value, and that of the fullest channel of the darkest signal less dark.
+    ones 0; `least`: what no squared distance of a pair is below. Ratios are compared without a division.
     """
     own = others[:, 0] ** 2 + others[:, 1] ** 2 + others[:, 2] ** 2
-    fullest = np.array([larger(larger(signal[0], signal[1]), signal[2]) for signal in others])
     for begin in range(0, len(values), _LANES):
         block = np.ascontiguousarray(values[begin : begin + _LANES].T)
         n = block.shape[1]
-        length, largest, smallest, negative = np.empty_like(block), np.full(n, -np.inf), np.full(n, np.inf), 0.0
+        length, negative = np.empty_like(block), 0.0
         for signal in range(block.shape[0]):
             for d in range(n):
-                largest[d] = larger(largest[d], block[signal, d])
                 lit = block[signal, d] - dark[begin + d]
-                smallest[d] = smaller(smallest[d], larger(lit, fullest[signal]))
                 negative = smaller(negative, lit)
                 block[signal, d] = lit
                 length[signal, d] = own[signal] + lit * lit
-        most_dn[begin : begin + n], least_dn[begin : begin + n] = largest, smallest
         for pair in range(starts.size - 1):
             top, under = np.full(n, np.inf), np.ones(n)
             for start in range(starts[pair], starts[pair + 1], _AT_ONCE):

@@ -131,7 +131,7 @@ def _allowed_share(quantity: Quantity, needs: Mapping[str, str], row: Row, allow
 
     Of a figure of one pair under noise also that of its distance in DN which the tolerance allows.
     """
-    if needs.get(quantity.of or quantity.name) in ("filters", "parameters"):
+    if needs.get(quantity.of or quantity.name) in ("filters", "tasks", "parameters"):
         return _SAME
     pairs = [quantity.pair] if quantity.pair is not None else class_pairs(quantity.states)
     metric = CHROMATIC_CSD if "chromatic" in quantity.name else CSD

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...base.types import Array, Float
 from ...camera.noise import errors
+from ...camera.readout import light_of_elements
 from ...spectra.lights import Pair, class_pairs, pair_name
 from ..batch import Batch
 from ..discrimination import detectability, dprime, error_of
@@ -43,8 +44,6 @@ class Confusion(Metric):
 
     def of_cases(self, batch: Batch) -> Columns:
         """Compute d', and errors by exact sums over the digital numbers of few pixels, else from d'."""
-        if not batch.noisy:
-            return {}
         read, members = batch.read_with_noise, batch.confused
         shape = read.mean.shape
         mean, variance = (values.reshape(-1, *shape[2:]) for values in (read.mean, read.variance))
@@ -82,7 +81,9 @@ def _exact(batch: Batch) -> dict[Pair, Float[Array, "cases designs"]] | None:
     if not errors.few_pixels(batch.setup.scene, pixel, batch.setup.camera.mosaic):
         return None
     view = model.own_views[0]
-    channels, light = view.image.pixels_of_channels(), view.capture_light(model.exposures) if pixel.captures else None
+    channels, light = view.image.pixels_of_channels(), None
+    if pixel.captures:
+        light = light_of_elements(model.exposures, view.image.channel)
     of_exposures = model.pixel_electrons(batch.curves)
     electrons = np.moveaxis(of_exposures if pixel.captures else of_exposures[0], -3, 0)
     of_cases = [errors.errors(case, channels, pixel, batch.confused, light) for case in electrons]

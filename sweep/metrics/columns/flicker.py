@@ -64,8 +64,6 @@ class Flicker(Metric):
     def of_batch(self, batch: Batch) -> Columns:
         """Compute the columns, design by design, since phases depend on the exposure."""
         setup, rows = batch.setup, []
-        if setup.scene.drive is None or not setup.camera.pixel.captures:
-            return {}
         steady, light = scene_model(setup.steady), batch.model.light
         for design, time_s in zip(batch.curves, batch.exposure_s, strict=True):
             rows.append([_of_lamps(lamps, setup, light, time_s) for lamps in steady.lamps(design[None])])

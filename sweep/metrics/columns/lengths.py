@@ -42,8 +42,7 @@ class SmallestWidths(Metric):
 
     def of_batch(self, batch: Batch) -> Columns:
         """Return the columns of the narrowest edge and band of each design, nm; NaN where the family has none."""
-        if batch.points is None:
-            return {}
+        assert batch.points is not None
         rows, nothing = {} if batch.family is None else batch.family.dimensions, np.full((batch.size, 1), np.nan)
         lengths = {name: row_products(batch.points, rows[name].T) if name in rows else nothing for name in _MEANINGS}
         return {name: values.min(axis=1) for name, values in lengths.items()}

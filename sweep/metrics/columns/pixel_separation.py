@@ -6,15 +6,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from ...spectra.lights import pair_name
 from ..batch import Batch, CaseReadings
 from ..metric import Metric
 from ..quantity import Columns, Quantity, RequestedQuantities
 from ..separation import pixel_roots
 from ..smooth import Rows
-from .chromatic import CHROMATIC_CSD, ChromaticSeparation, completed, in_closed_form, room
+from .chromatic import CHROMATIC_CSD, ChromaticSeparation, closed, completed
 from .color_separation import CSD, ColorSeparation
 
 PIXEL_CSD, CHROMATIC_PIXEL_CSD = "pixel_csd", "chromatic_pixel_csd"
@@ -43,12 +41,8 @@ class PixelSeparation(Metric):
         counted = readings.times(roots)
         once = _ONCE.of_readings(counted)
         columns = {name.replace(CSD, PIXEL_CSD, 1): distances for name, distances in once.items()}
-        if readings.pairs:
-            distances, holds_dn = in_closed_form(counted), room(readings) * roots.min()
-            for pair in readings.pairs:
-                closed = np.where(distances[pair] <= holds_dn, distances[pair], np.nan)
-                columns[pair_name(CHROMATIC_PIXEL_CSD, pair)] = closed
-        return columns
+        by_pair = closed(counted, readings.room_dn * roots.min())
+        return columns | {pair_name(CHROMATIC_PIXEL_CSD, pair): values for pair, values in by_pair.items()}
 
     def of_cases(self, batch: Batch) -> Columns:
         """Compute columns of designs that have no closed form from brightness curves."""

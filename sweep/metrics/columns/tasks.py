@@ -22,7 +22,7 @@ class TaskFigures(Metric):
     """Columns of tasks; none if a study has no tasks."""
 
     order = 6
-    needs = "filters"
+    needs = "tasks"
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         if not requested.tasks:
@@ -48,8 +48,6 @@ class TaskFigures(Metric):
 
     def of_batch(self, batch: Batch) -> Columns:
         """Compute the columns; see `evaluation.task_columns`."""
-        if batch.setup.tasks is None:
-            return {}
         from ..tasks.evaluation import task_columns
 
         return task_columns(batch.setup, batch.block)

@@ -40,8 +40,7 @@ class ImageReading(Metric):
 
     def of_batch(self, batch: Batch) -> Columns:
         """Compute the mean over the images of one less the probability of the most probable state."""
-        if batch.images is None:
-            return {}
+        assert batch.images is not None
         errors = [_error(batch.setup, curves, batch.images) for curves in batch.curves]
         return {VISION_ERROR: np.array(errors)}
 
