@@ -145,7 +145,8 @@ def axis_of(setup: Setup, *, finer: bool) -> Axis:
         if len(phases) <= _MOST_FINE or steps <= setup.accuracy.phase_steps_per_px:
             break
         steps //= 2
-    centers = np.unique(phases.center_px, axis=0)
+    first = np.sort(np.unique(phases.center_px, axis=0, return_index=True)[1])
+    centers = phases.center_px[first]
     return Axis(
         centers,
         np.full(len(centers), 1 / steps),

@@ -56,11 +56,11 @@ class Position:
         return np.asarray(np.einsum("ncw,w->cn", self._seen(qe, channels), self.background), dtype=float)
 
     def _seen(self, qe: DesignCurves, channels: Sequence[int]) -> DesignCurves:
-        return self.angular.curves(qe, channels) if self._setup.computes("angle") else qe
+        return self.angular.curves(qe, channels) if self._setup.moves else qe
 
     def per_qe(self, light: Float[Array, "*batch wavelengths"], channel: int) -> Float[Array, "*batch wavelengths"]:
         """Return weights of a channel's curve at normal incidence, from those of its curve in the cone."""
-        if not self._setup.computes("angle"):
+        if not self._setup.moves:
             return light
         return self.angular.light(light[..., None, :], [channel])[..., 0, :]
 

@@ -102,10 +102,14 @@ class Setup:
         return self.scene.any_phase
 
     @property
+    def moves(self) -> bool:
+        """True if filters move with the angle of the light, and that is computed."""
+        return bool(self.camera.moving) and self.computes("angle")
+
+    @property
     def positions_differ(self) -> bool:
         """True if field positions differ in an effect that is computed."""
-        tilted = self.computes("angle") and bool(self.camera.moving)
-        return tilted or (self.computes("illumination") and self.scene.off_axis_deg != 0)
+        return self.moves or (self.computes("illumination") and self.scene.off_axis_deg != 0)
 
     @property
     def all_heights(self) -> bool:

@@ -238,19 +238,6 @@ class Batch:
             return np.full(self.size, self.along.of.exposure_s)
         return self.model.exposure_s(self.curves)
 
-    @cached_property
-    def _response(self) -> DesignCases:
-        """All channels of the designs that are not `along`."""
-        if self.noisy:
-            return self.read_with_noise.mean
-        return self.model.read(self._rest)[0]
-
-    @cached_property
-    def _rest(self) -> DesignCurves:
-        if self.along is None:
-            return self.curves
-        return self.block.subset(np.flatnonzero(~self.along.which)).curves()
-
     def readings(self) -> Iterator[tuple[np.ndarray, slice, CaseReadings]]:
         """Yield designs, cases, and their readings, cases first."""
         along = self.along
@@ -264,15 +251,19 @@ class Batch:
                     yield designs[part], slice(case, case + 1), CaseReadings(*of_case)
         rest = np.arange(self.size) if along is None else np.flatnonzero(~along.which)
         if rest.size:
-            yield from self._whole_readings(rest)
+            curves = self.curves if along is None else self.block.subset(rest).curves()
+            response = self.read_with_noise.mean if self.noisy else self.model.read(curves)[0]
+            yield from self._whole_readings(rest, curves, response)
 
-    def _whole_readings(self, designs: np.ndarray) -> Iterator[tuple[np.ndarray, slice, CaseReadings]]:
-        response, exposure_s = self._response, self.model.exposure_s(self._rest)
+    def _whole_readings(
+        self, designs: np.ndarray, curves: DesignCurves, response: DesignCases
+    ) -> Iterator[tuple[np.ndarray, slice, CaseReadings]]:
+        exposure_s = self.model.exposure_s(curves)
         n_cases, n_signals, n_channels = response.shape[1:]
         step = max(1, _READ_AT_ONCE // (n_cases * n_signals * n_channels))
         for start in range(0, designs.size, step):
             part = slice(start, start + step)
-            dark = self.model.unlit(self._rest[part], exposure_s[part])
+            dark = self.model.unlit(curves[part], exposure_s[part])
             n = len(dark)
             for first in range(0, n_cases, max(1, _AT_ONCE // n)):
                 cases = slice(first, min(first + max(1, _AT_ONCE // n), n_cases))

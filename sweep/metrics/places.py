@@ -121,15 +121,19 @@ class _Refinement:
         fine, pulsed = setup.accuracy.finest_phase_px > 0, model.light.bends
         if setup.all_phases and fine:
             axis = axis_of(setup, finer=self.sought.fine)
-            everywhere = np.ones((len(self.sought.designs), len(axis.places)), dtype=bool)
-            known = self._at_phases(axis.places, everywhere) if self.sought.fine else self._on_lattice(axis)
+            if self.sought.fine:
+                everywhere = np.ones((len(self.sought.designs), len(axis.places)), dtype=bool)
+                known = self._at_phases(axis.places, everywhere)
+            else:
+                own = self._both_ends(self._own().min(axis=(2, 4)))
+                known = own[:, :, phases_at(setup, axis.places)[1]].min(axis=2)
             values, places = self._searched(axis, known, self._at_phases)
             if pulsed:
                 values = self._at_worst_moments(values, places)
             self._put(columns, values, best=True)
         elif pulsed and not setup.all_heights:
-            own = model.own_views
-            values = np.stack([self._over_pulse(number, own) for number in range(len(self.sought.designs))])
+            every = range(len(self.sought.designs))
+            values = np.stack([self._over_pulse(number, model.own_views) for number in every])
             self._put(columns, values, best=model.n_cases == 1)
         if setup.all_heights and fine:
             heights = np.array(model.heights)
@@ -176,17 +180,6 @@ class _Refinement:
         else:
             flat = np.maximum(flat, _FLAT_DN * in_dn)
         return Search(axis, at, known, flat).run()
-
-    def _on_lattice(self, axis: Axis) -> _Values:
-        """Return values at the lattice of the scene; of equally near pixels the smallest."""
-        phases = self.model.phases
-        assert phases is not None
-        number = {center: at for at, center in enumerate(map(tuple, axis.places.tolist()))}
-        which = [number[center] for center in map(tuple, phases.center_px.tolist())]
-        of_phases = self._both_ends(self._own().min(axis=(2, 4)))
-        least = np.full((*of_phases.shape[:2], len(axis.places)), _MOST)
-        np.minimum.at(np.moveaxis(least, 2, 0), np.array(which), np.moveaxis(of_phases, 2, 0))
-        return least
 
     def _at_phases(self, places: _Places, asked: _Asked) -> _Values:
         """Return values at sampling phases, the smallest over field positions and moments."""
