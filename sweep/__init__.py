@@ -12,9 +12,11 @@ is `new_study`, `list` is `list_studies`, `open` is `show`; `read_run(...).repor
 Names are loaded at their first use; `__init__.pyi` has their types.
 """
 
+from .features import PUBLIC
+
 __version__ = "0.3.0"
 
-_LOCATIONS = {
+_LOCATIONS = PUBLIC | {
     "load_study": "api.loading:load_study",
     "make_study": "api.loading:make_study",
     "read_run": "api.loading:read_run",
@@ -26,12 +28,9 @@ _LOCATIONS = {
     "run": "api.run:run",
     "status": "runs.status:status",
     "audit": "runs.audit:audit",
-    "compare": "report.compare:compare",
-    "export": "api.export:export",
     "export_images": "api.export_images:export_images",
     "score": "report.scores:score",
     "show": "api.run:show",
-    "describe": "report.describe:describe",
     "evaluate": "api.evaluate:evaluate",
     "sensor": "api.loading:sensor",
     "lights": "api.loading:lights",

@@ -1,6 +1,5 @@
 from .api.check import check, plan
 from .api.evaluate import evaluate
-from .api.export import export
 from .api.export_images import export_images
 from .api.inline_curves import read_curves
 from .api.loading import lights, load_study, make_study, read_run, sensor, studies
@@ -14,9 +13,10 @@ from .camera.scene import Scene, Target
 from .designs.families.dual import Dual
 from .designs.families.free_form import FreeForm
 from .designs.families.stopband import MultiStopband, Stopband
+from .features.compare.compare import compare
+from .features.describe.describe import describe
+from .features.export.export import export
 from .metrics.quantity import Quantity
-from .report.compare import compare
-from .report.describe import describe
 from .report.scores import score
 from .runs.audit import audit
 from .runs.listing import list_studies

@@ -8,8 +8,9 @@ import sys
 from contextlib import redirect_stderr, redirect_stdout
 from unittest import mock
 
-from sweep.cli.app import main
+from sweep.cli.app import app, main
 
+COMMANDS = {command.name for command in app.registered_commands}
 UNDRAWN = """\
 import signal
 signal.signal(signal.SIGINT, signal.SIG_DFL)  # while it is loaded, a stop ends it without a word, as `start` has it

@@ -28,6 +28,7 @@ if "UNCHECKED_TYPES" not in os.environ:  # of tests that take long
         }
     )
 
+from sweep.features import FEATURES
 from sweep.study import Study
 
 from .commanded import commanded
@@ -100,6 +101,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid in DEAR:
             item.add_marker(pytest.mark.slow)
+    items[:] = [
+        item for item in items if all(name in FEATURES for of in item.iter_markers("feature") for name in of.args)
+    ]
     processes = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     kinds = [[item for item in items if (item.get_closest_marker("long") is None) is short] for short in (False, True)]
     ends = [[len(kind) * at // processes for at in range(processes + 1)] for kind in kinds]
@@ -219,7 +223,8 @@ def without_pictures(patch: pytest.MonkeyPatch) -> None:
 def draw_nothing(patch: pytest.MonkeyPatch) -> None:
     """Reports and descriptions whose pictures take no time: for tests of the files and of the text."""
     without_pictures(patch)
-    patch.setattr("sweep.report.describe._png", lambda *_: b"sweep describe")
+    if "describe" in FEATURES:
+        patch.setattr("sweep.features.describe.describe._png", lambda *_: b"sweep describe")
 
 
 @pytest.fixture

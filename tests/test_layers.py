@@ -30,6 +30,7 @@ LEVELS = [
     "report",
     "api",
     "cli",
+    "features",
     "__main__",
 ]
 """Subpackages from the lowest to the highest, and the file that starts the program."""
@@ -38,7 +39,7 @@ ONLY_USER = {
     "joblib": ["runs/"],
     "moocore": ["metrics/pareto"],
     "jinja2": ["report/"],
-    "typer": ["cli/"],
+    "typer": ["cli/", "features/"],
     "jax": ["vision/network"],
     "optax": ["vision/network"],
     "numba": ["base/machine_code", "base/lane_kernels"],
@@ -87,6 +88,10 @@ def breaches(root: Path) -> list[str]:
                 lines.append(f"{where}:{line} imports the package by its name")
             elif library in ONLY_USER and not where.as_posix().startswith(tuple(ONLY_USER[library])):
                 lines.append(f"{where}:{line} imports {library}, which only {ONLY_USER[library]} may")
+            elif target == ("features",):
+                continue  # the list of features, which every level may ask
+            elif target[:1] == ("features",) == (unit,) and target[1] != where.parts[1]:
+                lines.append(f"{where}:{line} imports the feature {target[1]}")
             elif target and target[0] not in (unit, *lower):
                 lines.append(f"{where}:{line} ({unit}) imports {target[0]}, which is not below it")
     return lines
@@ -124,6 +129,8 @@ def test_every_file_is_in_a_level_and_imports_point_downward() -> None:
         ("search/limit.py", "import nlopt"),
         ("stray/inner.py", "x = 1"),
         ("__init__.py", "from .cli.app import main"),
+        ("cli/app.py", "from ..features.compare import compare"),
+        ("features/compare/compare.py", "from ..describe import describe"),
     ],
 )
 def test_a_breach_is_found(tmp_path: Path, file: str, text: str) -> None:

@@ -1,4 +1,4 @@
-"""The command line: every public function of a file in `commands` is a command."""
+"""The command line: every public function of a file in `commands`, or a `commands.py` of a feature, is a command."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import typer
 
 from ..base.errors import EXIT_CODES
 from ..base.modules import files_in
+from ..features import modules
 from . import commands
 from .endings import ends_in_lines
 from .options import PANELS
@@ -43,7 +44,7 @@ def _start(
     context.obj = time.monotonic()  # commands say how long they took
 
 
-for _module in sorted(files_in(commands), key=lambda module: PANELS.index(module.PANEL)):
+for _module in sorted([*files_in(commands), *modules("commands")], key=lambda module: PANELS.index(module.PANEL)):
     for _name, _function in vars(_module).items():
         if isfunction(_function) and _function.__module__ == _module.__name__ and not _name.startswith("_"):
             app.command(_name.rstrip("_"), rich_help_panel=_module.PANEL)(_function)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from ..build import SCENES
-from ..commanded import commanded
+from ..commanded import COMMANDS, commanded
 from ..conftest import MEASURED, ROOT, draw_nothing
 
 SECTION = (ROOT / "studies" / "guide" / "reference.md").read_text().split("## JSON objects")[1].split("## ")[0]
@@ -48,7 +48,23 @@ def arguments(base: Path, command: str) -> tuple[object, ...]:
 @pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize(
     "command",
-    ["run", "check", "plan", "new", "evaluate", "describe", "list", "status", "compare", "audit", "export", "report"],
+    sorted(
+        COMMANDS
+        & {
+            "run",
+            "check",
+            "plan",
+            "new",
+            "evaluate",
+            "describe",
+            "list",
+            "status",
+            "compare",
+            "audit",
+            "export",
+            "report",
+        }
+    ),
 )
 def test_a_command_says_one_documented_object(base: Path, command: str) -> None:
     code, out, _ = commanded(command, *arguments(base, command), "--json")

@@ -99,6 +99,7 @@ def test_the_widest_band_is_no_wider_than_that_of_any_peak(top_nm: float) -> Non
     assert peak_nm == pytest.approx(top_nm, abs=0.5)
 
 
+@pytest.mark.feature("export")
 def test_the_specification_has_amounts_for_every_width(folder: Path, tmp_path: Path) -> None:
     """A = e c l: 0.8 um of a dye of 80,000 l/(mol cm) have an absorbance of 6.4 per mol/l; 400 g/mol in 1,250 g/l."""
     code, _, _ = commanded(*("export", folder / "out", "--design", "best", "--specification", "--output", tmp_path))

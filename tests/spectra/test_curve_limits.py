@@ -12,10 +12,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from sweep.base.errors import DataError, SweepError
-from sweep.report.describe import describe
-from sweep.report.describe_picture import draw
-from sweep.spectra.facts import Curve, Facts
+from sweep.base.errors import DataError
 from sweep.spectra.formats import read_curves, scan_curves
 from sweep.spectra.read_table import MOST_CURVES
 from sweep.spectra.spectrum import LARGEST, LEAST_PEAK, check_samples
@@ -138,15 +135,6 @@ def test_tables_up_to_the_limits_are_read(tmp_path: Path) -> None:
         assert len(read_curves(lines(tmp_path / "wide.csv", "wavelength_nm," + names, *rows)).values) == MOST_CURVES
 
 
-def test_a_picture_of_many_samples_keeps_their_extremes() -> None:
-    wave, values = np.linspace(400, 700, 100_003), np.random.default_rng(3).random(100_003)
-    values[77_777] = 9
-    figure = draw("many", Facts((Curve("a", wave, values),)), {})
-    (drawn,) = (line.get_ydata() for line in figure.axes[0].lines if len(line.get_ydata()) > 100)
-    assert len(drawn) < 10_000
-    assert drawn.max() == 9
-
-
 def test_of_many_faults_reading_stops(tmp_path: Path) -> None:
     names = ",".join(f"c{i}" for i in range(1000))
     rows = [f"{400 + i},{','.join((['x', '1'], ['1', 'x'])[i % 2] * 500)}" for i in range(300)]
@@ -191,12 +179,9 @@ def test_values_that_nothing_can_be_computed_with() -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
-def test_pipes_are_no_curve_files_and_no_pictures(tmp_path: Path) -> None:
-    for name in ("pipe.csv", "pipe.mat", "a.png"):
+def test_pipes_are_no_curve_files(tmp_path: Path) -> None:
+    for name in ("pipe.csv", "pipe.mat"):
         os.mkfifo(tmp_path / name)
     for path in (tmp_path / "pipe.csv", tmp_path / "pipe.mat"):
         with pytest.raises(DataError, match="not a file"), within(HANG_S):
             read_curves(path)
-    good = lines(tmp_path / "a.csv", "wavelength_nm,R", "400,0.1", "550,0.5", "700,0.1")
-    with pytest.raises(SweepError, match="not a file"), within(HANG_S):
-        describe(good, output=tmp_path)

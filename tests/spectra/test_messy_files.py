@@ -84,6 +84,7 @@ def test_a_file_variant_is_read_and_says_how(tmp_path: Path, name: str) -> None:
     np.testing.assert_allclose(values, QE, rtol=1e-5, atol=0.03 if rounded else 1e-12)
 
 
+@pytest.mark.feature("describe")
 @pytest.mark.usefixtures("plain_pictures")
 def test_how_a_file_was_read_is_said_where_it_is_used(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sweep.report.describe import describe
-from sweep.spectra.facts import EACH_NORMALIZED, NORMALIZED
+from sweep.spectra.facts import EACH_NORMALIZED, NORMALIZED, facts_of, notes
+from sweep.spectra.formats import scan_curves
 from sweep.study import load_study
 
 from ..curve_texts import csv
@@ -38,11 +38,11 @@ def test_a_study_warns_of_normalized_curves_after_scaling(
     curves = [top * (1 - 1e-9) * np.exp(-(((NM - nm) / 80) ** 2)) for nm in (610, 540, 460)]
     qe = csv(tmp_path, "wavelength_nm,R,G,B", NM, *curves, name="qe.csv")
     if keys == "qe, scale: 1":
-        assert (f"Note: {NORMALIZED}." in describe(qe, output=tmp_path).lines) == normalized
+        assert (NORMALIZED in notes(facts_of(scan_curves(qe)), as_qe=True)) == normalized
     text = STUDY.replace("KEYS", keys)
     (tmp_path / "tiny.yaml").write_text(
         text.replace("{files", "{builtin: ar0820, files") if "relative" in keys else text
     )
     study = load_study(tmp_path / "tiny.yaml")
-    notes = [NORMALIZED] * normalized + [EACH_NORMALIZED] * ("qe" in keys)
-    assert list(study.warnings) == [f"qe.csv: {note}" for note in notes]
+    said = [NORMALIZED] * normalized + [EACH_NORMALIZED] * ("qe" in keys)
+    assert list(study.warnings) == [f"qe.csv: {note}" for note in said]

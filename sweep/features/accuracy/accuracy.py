@@ -16,24 +16,24 @@ import pandas as pd
 import pyarrow as pa
 from threadpoolctl import threadpool_limits
 
-from ..base.answer import Answer
-from ..base.errors import SweepError, ValidationIssue
-from ..base.types import Array, DesignNumbers, Float, Progress
-from ..camera.accuracy import PRESETS, Accuracy, Preset
-from ..camera.model import SceneModel
-from ..camera.setup import Setup
-from ..designs.block import CurveBlock, edges_of_some
-from ..designs.space import Space
-from ..metrics.evaluate import evaluate
-from ..metrics.quantity import BEST_PHASE, Columns
-from ..metrics.separation import csd_name
-from ..results.atomic import write_bytes
-from ..results.tables import write_table
-from ..runs.dry_run import spread
-from ..spectra.lights import class_pairs
-from ..study import Study
-from .panels import Lines, axis_over, png, svg
-from .tables import aligned
+from ...base.answer import Answer
+from ...base.errors import SweepError, ValidationIssue
+from ...base.types import Array, DesignNumbers, Float, Progress
+from ...camera.accuracy import PRESETS, Accuracy, Preset
+from ...camera.model import SceneModel
+from ...camera.setup import Setup
+from ...designs.block import CurveBlock, edges_of_some
+from ...designs.space import Space
+from ...metrics.evaluate import evaluate
+from ...metrics.quantity import BEST_PHASE, Columns
+from ...metrics.separation import csd_name
+from ...report.panels import Lines, axis_over, png, svg
+from ...report.tables import aligned
+from ...results.atomic import write_bytes
+from ...results.tables import write_table
+from ...runs.dry_run import spread
+from ...spectra.lights import class_pairs
+from ...study import Study
 
 _MOST_DESIGNS = 5
 _WHOLE_NM = 1e-6

@@ -12,17 +12,17 @@ from scipy.integrate import trapezoid
 from scipy.io import loadmat
 
 import sweep
-from sweep.api.export import export, relative_transmission
 from sweep.base.errors import OutputError, SweepError
+from sweep.features.export.export import export, relative_transmission
 from sweep.results.dataset import part_paths
 from sweep.runs.audit import audit
 from sweep.spectra.filter_files import color_hints, csv_text, unique_names
 from sweep.spectra.formats import read_curves
 from sweep.study import load_study
 
-from ..build import one_line, ran, stopband_study, study_file
-from ..curve_texts import WAVE, bell, csv
-from ..tampering import listed_anew
+from ...build import one_line, ran, stopband_study, study_file
+from ...curve_texts import WAVE, bell, csv
+from ...tampering import listed_anew
 
 FILES = stopband_study(
     "files",

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sweep.api.new import write_schema
-from sweep.base.errors import OutputError
-from sweep.report.describe import describe
+from sweep.base.errors import OutputError, SweepError
+from sweep.features.describe.describe import describe
+from sweep.features.describe.picture import draw
+from sweep.spectra.facts import Curve, Facts
 from sweep.spectra.signal_color import VISIBLE, light_color, outline
-from sweep.study.editors import schema_text
 
-from ..commanded import commanded
-from ..curve_texts import WAVE, bell, csv
-from ..late import Late
+from ...commanded import commanded
+from ...curve_texts import WAVE, bell, csv
+from ...late import Late
+from ...watchdog import within
 
 
 @pytest.mark.parametrize(
@@ -77,22 +79,18 @@ def test_a_picture_of_another_stays(tmp_path: Path) -> None:
     assert picture.read_bytes() == b"mine"
 
 
-def test_a_schema_replaces_only_a_schema(tmp_path: Path) -> None:
-    path = tmp_path / "study.schema.json"
-    path.write_text('{"title": "A study of sweep", "older": true}')
-    for _ in range(2):  # also one that it wrote itself
-        write_schema(path)
-        assert path.read_text() == schema_text()
-    path.write_text(schema_text().replace("A study of sweep", "StudySection", 1))  # and of an earlier version
-    write_schema(path)
-    assert path.read_text() == schema_text()
-    path.unlink()
-    path.symlink_to("/dev/zero")  # it never ends
-    with pytest.raises(OutputError, match="not a file"):
-        write_schema(path)
-    path.unlink()
-    for held in ("mine", '{"title": "mine"}', "[]"):
-        path.write_text(held)
-        with pytest.raises(OutputError, match="holds something else already"):
-            write_schema(path)
-        assert path.read_text() == held
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_pipe_is_no_picture(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.png")
+    good = csv(tmp_path, "wavelength_nm,R", WAVE, bell(550, 30), name="a.csv")
+    with pytest.raises(SweepError, match="not a file"), within(120.0):
+        describe(good, output=tmp_path)
+
+
+def test_a_picture_of_many_samples_keeps_their_extremes() -> None:
+    wave, values = np.linspace(400, 700, 100_003), np.random.default_rng(3).random(100_003)
+    values[77_777] = 9
+    figure = draw("many", Facts((Curve("a", wave, values),)), {})
+    (drawn,) = (line.get_ydata() for line in figure.axes[0].lines if len(line.get_ydata()) > 100)
+    assert len(drawn) < 10_000
+    assert drawn.max() == 9

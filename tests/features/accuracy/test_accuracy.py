@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.report.accuracy import measure_accuracy
+from sweep.features.accuracy.accuracy import measure_accuracy
 from sweep.runs.dry_run import spread
 from sweep.study import Study, load_study
 
-from ..build import stopband_study
+from ...build import stopband_study
 
 TWO_SCENES = stopband_study(
     "two",

@@ -12,13 +12,13 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import OutputError, SweepError
-from sweep.report.compare import compare
+from sweep.features.compare.compare import compare
 from sweep.report.numbers import NARROW, amount
 from sweep.study import load_study
 
-from ..build import STUDY, ran
-from ..conftest import without_pictures
-from ..tampering import listed_anew
+from ...build import STUDY, ran
+from ...conftest import without_pictures
+from ...tampering import listed_anew
 
 SWEEP = STUDY.replace("COUNT", "3").split("search:")[0]
 CHART = SWEEP.replace("  dim: {exposure: {kind: fixed, exposure_s: 0.002}}\n", "")

@@ -8,22 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from ..base.answer import Answer
-from ..base.errors import OutputError, SweepError, ValidationIssue
-from ..base.types import PerWavelength
-from ..report.bands import specification as specification_of
-from ..results.atomic import write_bytes
-from ..results.designs import BEST, channel_curves, check_kept, find_design_row, row_space, study_of
-from ..results.folder import run_folder
-from ..results.output import Output, read_output
-from ..spectra.filter_files import (
+from ...base.answer import Answer
+from ...base.errors import OutputError, SweepError, ValidationIssue
+from ...base.types import PerWavelength
+from ...report.bands import specification as specification_of
+from ...results.atomic import write_bytes
+from ...results.designs import BEST, channel_curves, check_kept, find_design_row, row_space, study_of
+from ...results.folder import run_folder
+from ...results.output import Output, read_output
+from ...spectra.filter_files import (
     color_hints,
     csv_text,
     filter_names,
     isetcam_mat,
     unique_names,
 )
-from ..study import Study, folder_name
+from ...study import Study, folder_name
 
 _ROUNDING = 1e-9
 _MOST_SHOWN = 10

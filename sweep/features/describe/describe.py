@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from ..base.answer import Answer
-from ..base.disk import read_input
-from ..base.errors import DataError, OutputError, ValidationIssue
-from ..results.atomic import write_bytes
-from ..spectra.facts import Curve, Facts, facts_of, merge_equal_issues, notes
-from ..spectra.formats import curves_from, scan_curves
-from ..spectra.signal_color import LightColor
-from ..spectra.spectrum import Quantity
-from ..spectra.units import FITTING, Use, stated_quantity, used_as
-from .describe_picture import draw
+from ...base.answer import Answer
+from ...base.disk import read_input
+from ...base.errors import DataError, OutputError, ValidationIssue
+from ...results.atomic import write_bytes
+from ...spectra.facts import Curve, Facts, facts_of, merge_equal_issues, notes
+from ...spectra.formats import curves_from, scan_curves
+from ...spectra.signal_color import LightColor
+from ...spectra.spectrum import Quantity
+from ...spectra.units import FITTING, Use, stated_quantity, used_as
+from .picture import draw
 
 _MOST_NAMES = 12
 _MOST_PICTURE = 100_000_000

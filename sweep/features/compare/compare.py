@@ -12,19 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from ..base.answer import Answer
-from ..base.errors import OutputError, SweepError, ValidationIssue
-from ..results.atomic import write_bytes, write_text
-from ..results.folder import run_folder
-from ..results.output import read_output
-from ..results.tables import csv_of
-from ..study import folder_name
-from .numbers import SHARE, joined
-from .page import Report
-from .panels import Lines, Section, axis_over, png, svg
-from .run import LIGHT, Run, unit_of, words_of
-from .sections import conditions
-from .tables import Column, Table
+from ...base.answer import Answer
+from ...base.errors import OutputError, SweepError, ValidationIssue
+from ...report.numbers import SHARE, joined
+from ...report.page import Report
+from ...report.panels import Lines, Section, axis_over, png, svg
+from ...report.run import LIGHT, Run, unit_of, words_of
+from ...report.sections import conditions
+from ...report.tables import Column, Table
+from ...results.atomic import write_bytes, write_text
+from ...results.folder import run_folder
+from ...results.output import read_output
+from ...results.tables import csv_of
+from ...study import folder_name
 
 PAGE, PICTURE, TABLE = "compare.html", "fronts", "compare.csv"
 _MARK = '<meta name="generator" content="sweep compare">'

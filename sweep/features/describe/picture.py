@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import PerValue
-from ..spectra.color import REGIONS, display_colors
-from ..spectra.facts import Curve, Facts
-from ..spectra.signal_color import VISIBLE, LightColor, outline, spectral_locus
-from .figures import CURVE_CYCLE, TYPE_COLORS, panel_grid
-from .panels import CHANNELS
+from ...base.types import PerValue
+from ...report.figures import CURVE_CYCLE, TYPE_COLORS, panel_grid
+from ...report.panels import CHANNELS
+from ...spectra.color import REGIONS, display_colors
+from ...spectra.facts import Curve, Facts
+from ...spectra.signal_color import VISIBLE, LightColor, outline, spectral_locus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,0 +1,1 @@
+"""What accuracy costs: error and time of each preset, and of steps of the wavelengths."""
