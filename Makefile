@@ -19,8 +19,6 @@ BIN := $(VENV)/bin
 OLDEST := .venv-oldest
 NAME ?= stopband
 ARGS ?=
-# A study of vision needs the extra of that name, and no other study does.
-EXTRA = $(if $(shell grep -s "^vision:" studies/$(NAME).yaml),-vision)
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 # Tests start hundreds of processes, which would each compile the package's source anew.
 unexport PYTHONDONTWRITEBYTECODE
@@ -30,7 +28,7 @@ KERNELS := sweep/base/machine_code.py $(shell grep -rl --include=*.py "machine_c
 .PHONY: study report test slow oldest mutants accuracy check tables gallery docs bench clean
 .DELETE_ON_ERROR:
 
-study: $(VENV)/.ready$(EXTRA)
+study: $(VENV)/.ready
 	$(BIN)/sweep run studies/$(NAME).yaml $(ARGS)
 
 report: $(VENV)/.ready
@@ -89,15 +87,10 @@ $(VENV)/.ready: pyproject.toml | $(VENV)/bin/python
 	@$(BIN)/python -m compileall -q sweep
 	@touch $@
 
-$(VENV)/.ready-vision: pyproject.toml | $(VENV)/bin/python
-	$(INSTALLING)
-	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[vision]'
-	@touch $@ $(VENV)/.ready
-
 $(VENV)/.ready-dev: pyproject.toml | $(VENV)/bin/python
 	$(INSTALLING)
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
-	@touch $@ $(VENV)/.ready $(VENV)/.ready-vision
+	@touch $@ $(VENV)/.ready
 
 # Made anew each time, as what is installed would not go down. uv alone picks the oldest versions, and serves nothing else.
 $(OLDEST)/.oldest: pyproject.toml
@@ -105,7 +98,7 @@ $(OLDEST)/.oldest: pyproject.toml
 	$(PYTHON) -m venv --clear $(OLDEST)
 	$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check uv
 	$(OLDEST)/bin/uv pip install --quiet --python $(OLDEST)/bin/python --resolution lowest-direct -e '.[dev]'
-	@touch $(OLDEST)/.ready $(OLDEST)/.ready-vision $(OLDEST)/.ready-dev $@
+	@touch $(OLDEST)/.ready $(OLDEST)/.ready-dev $@
 
 $(VENV)/.compiled: $(VENV)/.ready-dev tests/compile.py $(KERNELS)
 	@echo "Compiling what the tests share: once, which takes half a minute."
@@ -120,4 +113,4 @@ $(VENV)/.ready-docs: pyproject.toml | $(VENV)/bin/python
 $(VENV)/.ready-bench: pyproject.toml | $(VENV)/bin/python
 	$(INSTALLING)
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,bench]'
-	@touch $@ $(VENV)/.ready $(VENV)/.ready-vision $(VENV)/.ready-dev
+	@touch $@ $(VENV)/.ready $(VENV)/.ready-dev

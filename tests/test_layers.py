@@ -40,8 +40,6 @@ ONLY_USER = {
     "moocore": ["metrics/pareto"],
     "jinja2": ["report/"],
     "typer": ["cli/", "features/"],
-    "jax": ["vision/network"],
-    "optax": ["vision/network"],
     "numba": ["base/machine_code", "base/lane_kernels"],
 }
 """The files, or all of a folder, that alone may import a library."""

@@ -37,7 +37,6 @@ study = sweep.make_study(
         "train_images": 1000,
         "test_images": 100,
         "prototypes": False,
-        "network": False,
     },
 )
 run = study.run(tempfile.mkdtemp())

@@ -42,7 +42,6 @@ study = sweep.make_study(
         "train_images": 50,
         "test_images": 20,
         "prototypes": False,
-        "network": False,
         "street": {"columns": 4, "rows": 2, "heads": 2, "brake_lamps": 1, "street_lamps": 1, "test_images": 60},
     },
 )

@@ -16,7 +16,7 @@ from ..results.output import Output
 from ..results.tables import RGGB, VISION, VISION_CONDITIONS, VISION_LEARNING, VISION_STREET
 from ..vision.detections import ALL, precision_scores
 from ..vision.readers import OBSERVER
-from ..vision.scenes import NETWORK, PROTOTYPES, SHUFFLED, UNSEEN, states_of
+from ..vision.scenes import PROTOTYPES, SHUFFLED, UNSEEN, states_of
 from ..vision.scores import Interval, confusion_matrix, interval_of_seeds, mean_of
 from ..vision.section import Vision
 from .numbers import SHARE, amount
@@ -27,7 +27,6 @@ from .tables import Axis, Column, Marks, Table
 READER_NAMES = {
     OBSERVER: "ideal observer",
     PROTOTYPES: "prototype network",
-    NETWORK: "trained network",
 }
 _FEWEST_RANKED = 5
 """Designs that a rank correlation between designs needs."""
@@ -68,7 +67,7 @@ class Benchmark:
 
     @property
     def main_reader(self) -> str:
-        """Reader by which designs are compared: the prototype network, the trained one, or the observer."""
+        """Reader by which designs are compared: the prototype network, or the observer."""
         return self.learners[0] if self.learners else OBSERVER
 
     @property

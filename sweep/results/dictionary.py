@@ -190,7 +190,7 @@ FILES = {
     "light and regularization of the color matrix",
     files.VISION: "a row per image of the benchmark of vision: design_id, name, cfa, seed, order (of the lenses), "
     "lamps (seen in training or unseen), image, state, lamp, intensity_cd, background, phantom, distance_m, level, "
-    "and of each reader (observer, network, prototypes) what it says, its probability (`_p`), and the error to expect "
+    "and of each reader (observer, prototypes) what it says, its probability (`_p`), and the error to expect "
     "of that answer, one less its probability by the observer (`_risk`)",
     files.VISION_CONDITIONS: "of each design at each distance and level of light: csd (DN), dprime and pair_error, the "
     "smallest or the largest over the pairs of lenses",

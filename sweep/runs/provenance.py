@@ -47,8 +47,6 @@ def provenance(study: Study, how: Mapping[str, Any]) -> dict[str, Any]:
 
     `how`: `command`, `duration_s`, `backend`, `scheduler` and `workers` of the run.
     """
-    vision = study.section.vision
-    packages = (*_PACKAGES, "jax", "optax") if vision is not None and vision.network else _PACKAGES
     return {
         **how,
         "seed": study.section.seed,
@@ -63,7 +61,7 @@ def provenance(study: Study, how: Mapping[str, Any]) -> dict[str, Any]:
             "has_clear": study.sensor.has_clear,
         },
         "lights": {"name": study.lights.name, "source": study.lights.source, "surrogate": study.lights.surrogate},
-        "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
+        "versions": {"python": platform.python_version()} | {name: version(name) for name in _PACKAGES},
         "platform": platform.platform(),
         "byte_order": sys.byteorder,
         "cores": os.cpu_count(),

@@ -51,7 +51,6 @@ from ..search.problem import CONVERGED
 from ..search.upper_bound import UpperBound
 from ..study import Study
 from ..study.goals import refuse_unreachable
-from ..vision.installed import require_network
 from .check import check_run
 from .derived import DerivedInput, row_tables
 from .details import design_details
@@ -140,8 +139,6 @@ def run_study(
     """
     started = time.monotonic()
     refuse_unreachable(study)
-    if study.section.vision is not None and study.section.vision.network:
-        require_network()
     with stopped_by_signals(), locked(output):
         manifest = begin(output, run_facts(study))
         wrong = set(manifest.wrong(files_of(study)))

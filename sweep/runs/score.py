@@ -24,7 +24,7 @@ from ..results.tables import VISION
 from ..vision.batches import image_id
 from ..vision.detections import ALL
 from ..vision.lamps import TEST
-from ..vision.scenes import NETWORK, PROTOTYPES, SHUFFLED, UNSEEN, states_of
+from ..vision.scenes import PROTOTYPES, SHUFFLED, UNSEEN, states_of
 from ..vision.scores import Interval, interval_of_seeds
 from ..vision.section import Vision
 
@@ -65,7 +65,7 @@ def unseen_images(output: Output) -> pd.DataFrame:
 
 
 def images_of_test(images: pd.DataFrame) -> pd.DataFrame:
-    """Return the images of lamps that no network has seen, with `image_id`."""
+    """Return the images of lamps that no reader has seen, with `image_id`."""
     unseen = images[images["lamps"] == UNSEEN]
     keys = zip(unseen["design_id"], unseen["seed"], unseen["order"], unseen["image"], strict=True)
     return unseen.assign(**{_ID: [image_id(d, seed, order, TEST, at) for d, seed, order, at in keys]})
@@ -78,7 +78,7 @@ def scores_of_table(output: Output, predictions: pd.DataFrame) -> pd.DataFrame:
     return scores_of(reader, images, vision.unknown_cost)
 
 
-LEARNED = (PROTOTYPES, NETWORK)
+LEARNED = (PROTOTYPES,)
 """Readers of a run that learn."""
 
 

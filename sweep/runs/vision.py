@@ -22,7 +22,7 @@ from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..vision.images import setup_at
 from ..vision.readers import OBSERVER, Answers, SeedReading, read_images
-from ..vision.scenes import NETWORK, ORDERS, PROTOTYPES, SEEN, SHUFFLED, UNSEEN, states_of
+from ..vision.scenes import ORDERS, PROTOTYPES, SEEN, SHUFFLED, UNSEEN, states_of
 from ..vision.section import Vision
 from .workers import run_with_progress
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 _TEXT, _NUMBER, _COUNT = pa.string(), pa.float64(), pa.int64()
 _DESIGN = [("design_id", _COUNT), ("name", _TEXT), ("cfa", _TEXT)]
-_READERS = (OBSERVER, NETWORK, PROTOTYPES)
+_READERS = (OBSERVER, PROTOTYPES)
 _IMAGES = pa.schema(
     [
         *_DESIGN,

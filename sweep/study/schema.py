@@ -345,7 +345,7 @@ class StudySection(Section):
     tasks: TasksAsked = None
     """Further tasks of the camera: `all`, a list of tasks of the package, or a mapping with own ones."""
     vision: Vision | None = None
-    """Images of signal heads, read by the ideal observer and by a network; lamps need luminous intensity."""
+    """Images of signal heads, read by the ideal observer and by a reader that learns; lamps need luminous intensity."""
     metrics: Annotated[
         list[Name], BeforeValidator(listed, json_schema_input_type=list[Name] | Name), Field(max_length=_MOST_OWN)
     ] = []

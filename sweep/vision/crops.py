@@ -20,7 +20,7 @@ from .head import heights
 from .image_kernels import draw_crops
 from .images import HeadCamera, Numbers
 from .lamps import Lamps
-from .planes import demosaicked, in_noise
+from .planes import in_noise
 from .scenes import PHANTOM_SHARE, Scenes, orders_of_lenses
 from .section import Vision
 
@@ -126,11 +126,6 @@ class Crops:
         """Return the crops of drawn images."""
         crops = self._table[-1][numbers.reshape(len(numbers), -1)[:, self._pixels]]
         return Seen(crops, scenes.distance, scenes.level, scenes.background, fixed)
-
-    def demosaicked(self, crops: Float32) -> Float32:
-        """Return every channel at every pixel."""
-        channels = demosaicked(crops.reshape(-1, *self._shape).astype(float), self._camera.setup.camera.mosaic)
-        return np.asarray(channels.reshape(len(crops), -1), dtype=np.float32)
 
 
 def reach_px(vision: Vision, tile: int) -> Int[IndexArray, " pixels"]:

@@ -1,11 +1,9 @@
-"""One design in the benchmark: answers of the ideal observer and of readers that learn to the same images."""
+"""One design in the benchmark: answers of the ideal observer and of a reader that learns to the same images."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -21,7 +19,7 @@ from .images import HeadCamera
 from .lamps import CHECK, TEST, TRAIN, Lamps, split_lamps
 from .observer import posteriors
 from .prototypes import Prototypes
-from .scenes import FIXED, NETWORK, ORDERS, PROTOTYPES, SHUFFLED, Scenes, draw_scenes
+from .scenes import FIXED, ORDERS, PROTOTYPES, SHUFFLED, Scenes, draw_scenes
 from .section import Vision
 from .street import StreetCamera, draw_streets, street_labels
 
@@ -57,13 +55,6 @@ class SeedReading:
     lit: Int[IndexArray, "streets lenses"]
 
 
-class Reader(Protocol):
-    """What has learned to read crops."""
-
-    def log_probabilities(self, seen: Seen) -> Float[Array, "images states"]:
-        """Return the logarithm of the probability of each state, but for a constant of each image."""
-
-
 def read_images(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tuple[int, int]) -> SeedReading:
     """Read the images of one design and one seed."""
     camera = HeadCamera(setup, curves, vision)
@@ -86,24 +77,14 @@ def read_images(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tuple
     check = scenes_of(vision, lamps, SHUFFLED, CHECK, seed)
     of_check, in_any_order = seen_of(check, SHUFFLED), shown[-2][1]
     learning: list[tuple[str, int, Int[IndexArray, " images"]]] = []
-    for name, learned, most in _learners(vision, seed):
-        for images in (math.ceil(most * share) for share in _SHARES):
-            reader = learned(crops, images)
-            learning.append((name, images, reader.log_probabilities(in_any_order).argmax(axis=1)))
+    if vision.prototypes:
+        for images in (math.ceil(vision.prototype_images * share) for share in _SHARES):
+            reader = Prototypes(crops, images)
+            learning.append((PROTOTYPES, images, reader.log_probabilities(in_any_order).argmax(axis=1)))
         scale = 1 / _temperature(reader.log_probabilities(of_check), check.state)
         for answers, own in shown:
-            answers.probabilities[name] = softmax(scale * reader.log_probabilities(own), axis=1)
+            answers.probabilities[PROTOTYPES] = softmax(scale * reader.log_probabilities(own), axis=1)
     return SeedReading(unseen, seen, learning, *_streets(camera, lamps, seed))
-
-
-def _learners(vision: Vision, seed: tuple[int, int]) -> Iterator[tuple[str, Callable[[Crops, int], Reader], int]]:
-    """Yield name, training and number of images of each reader that learns."""
-    if vision.prototypes:
-        yield PROTOTYPES, Prototypes, vision.prototype_images
-    if vision.network:
-        from .network_reader import NetworkReader  # noqa: PLC0415  (JAX: only where a study asks for a network)
-
-        yield NETWORK, lambda crops, images: NetworkReader(crops, images, seed), vision.network_images
 
 
 def _temperature(logs: Float[Array, "images states"], states: ImageNumbers) -> float:

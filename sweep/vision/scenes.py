@@ -20,7 +20,7 @@ ORDERS = (FIXED, SHUFFLED)
 SEEN, UNSEEN = "seen", "unseen"
 """Lamps of an image: used in the training of readers or not; the image itself never is."""
 PHANTOM_SHARE = 0.5
-NETWORK, PROTOTYPES = "network", "prototypes"
+PROTOTYPES = "prototypes"
 """Names of the readers that learn."""
 
 

@@ -40,7 +40,7 @@ class Interval:
 def interval_of_seeds(value: float, by_seed: Float[Array, " seeds"]) -> Interval:
     """Return a value with Student's t interval from its values in each seed.
 
-    Seeds are independent: each has scenes, and networks, of its own.
+    Seeds are independent: each has scenes, and readers, of its own.
 
     `by_seed`: value in each seed; those that are not finite are left out. NaN from fewer than two seeds.
     """

@@ -11,7 +11,6 @@ from ..camera.pixel import Optics
 from ..camera.scene import DIAMETER_M, Target
 
 Illuminant = Literal["daylight", "LED street light", "sodium street light"]
-Seen = Literal["raw", "demosaicked"]
 Material = Literal["foliage", "sky", "gray", "dark gray", "black", "white", "canopy", "soil", "asphalt", "concrete"]
 _Intensity = Annotated[float, Field(ge=1e-3, le=1e6)]
 _Text = Annotated[str, Field(min_length=1, max_length=100)]
@@ -75,9 +74,9 @@ class Street(Section):
 
 
 class Vision(Section):
-    """Benchmark of vision: images of signal heads, read by the ideal observer and by readers that learn.
+    """Benchmark of vision: images of signal heads, read by the ideal observer and by a reader that learns.
 
-    The observer reads raw pixels: on average over heads as they are drawn here, no reader of either input errs less.
+    The observer reads raw pixels: on average over heads as they are drawn here, no reader errs less.
     """
 
     lenses: Annotated[list[_Text], Field(min_length=2, max_length=4)] = ["red", "yellow", "green"]
@@ -101,7 +100,7 @@ class Vision(Section):
     places_per_pixel: int = Field(default=2, ge=1, le=4)
     """Positions of the head along a pixel, over the CFA's tile."""
     seeds: int = Field(default=5, ge=2, le=20)
-    """Seeds; each trains networks of its own."""
+    """Seeds; each trains readers of its own."""
     train_images: int = Field(default=10_000, ge=50, le=MOST_IMAGES)
     """Images of each seed and CFA for your own detector to learn from, lenses in any order."""
     check_images: int = Field(default=400, ge=20, le=MOST_IMAGES)
@@ -114,14 +113,8 @@ class Vision(Section):
     """`false` leaves the prototype network out; the ideal observer always reads the images."""
     prototype_images: int = Field(default=300_000, ge=1000, le=MOST_LEARNED)
     """Images from which the prototype network learns, of each seed and CFA; each is seen once, and not held."""
-    network: bool = True
-    """`false` leaves out the network that is trained by gradients."""
-    network_images: int = Field(default=100_000, ge=1000, le=MOST_LEARNED)
-    """Images from which that network learns, of each seed and CFA; each is seen once, and not held."""
     street: Street | None = None
     """Images of a street, too."""
-    input: Seen = "raw"
-    """Input of the network: `raw` pixels, or every channel at every pixel, `demosaicked` by a tent."""
 
     @model_validator(mode="after")
     def _fits(self) -> Vision:

@@ -57,7 +57,6 @@ vision:
   crop_px: 16
   places_per_pixel: 1
   prototypes: false
-  network: false
   seeds: 2
   train_images: 50
   check_images: 50

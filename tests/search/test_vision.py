@@ -26,7 +26,6 @@ VISION = {
     "crop_px": 8,
     "places_per_pixel": 1,
     "test_images": 200,
-    "network": False,
 }
 BOX = {"left_nm": [570, 650], "left_width_nm": 10, "right_nm": 680, "right_width_nm": 10}
 KEYS: dict[str, Any] = {

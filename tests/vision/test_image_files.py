@@ -47,7 +47,6 @@ vision:
   train_images: 300
   check_images: 20
   seeds: 2
-  network: false
   prototypes: false
   street: {columns: 3, rows: 2, heads: 2, brake_lamps: 2, street_lamps: 1, train_images: 20, test_images: 20}
 """

@@ -21,10 +21,7 @@ from sweep.vision.scores import confusion_matrix, costs, macro_f1, mean_of
 
 from ..build import BASE, issues, load
 from ..cases import thinned
-from ..late import Late
 from .heads import NO_FILTERS, head_setup, vision
-
-network_reader = Late("sweep.vision.network_reader")
 
 TWO = ["red", "orange"]
 
@@ -48,12 +45,6 @@ def test_the_likelihood_errs_as_two_gaussians_do() -> None:
     likely = np.exp(found - found.max(axis=1, keepdims=True))
     doubt = 1 - (likely / likely.sum(axis=1, keepdims=True)).max(axis=1)
     assert doubt.mean() == pytest.approx(least, abs=0.005)
-
-
-LEARNERS = {
-    "prototypes": Prototypes,
-    "network": lambda crops, images: network_reader.NetworkReader(crops, images, (1, 0)),
-}
 
 
 def cameras(cfa: str = "RGGB", **changes: object) -> tuple[HeadCamera, dict[str, Lamps]]:
@@ -93,8 +84,7 @@ def test_crops_are_all_different_and_the_same_again() -> None:
     assert not (drawn == first.draw(0, 0, heads)).all(axis=1).any()
 
 
-@pytest.mark.parametrize("name", LEARNERS)
-def test_a_reader_is_better_with_more_images_and_never_than_the_observer(name: str) -> None:
+def test_a_reader_is_better_with_more_images_and_never_than_the_observer() -> None:
     """Expected errors by the observer's probabilities, of lamps that it has not learned from."""
     camera, lamps = cameras("RYYCy", test_images=400)
     scenes = draw_scenes(camera.vision, lamps[TEST], SHUFFLED, 400, (8,))
@@ -103,7 +93,7 @@ def test_a_reader_is_better_with_more_images_and_never_than_the_observer(name: s
     risks, wrong = [], []
     for images in (1500, 60_000):
         crops = Crops(camera, lamps[TRAIN], (1, 0))
-        reader = LEARNERS[name](crops, images)
+        reader = Prototypes(crops, images)
         said = reader.log_probabilities(crops.seen(numbers, scenes, fixed=False)).argmax(axis=1)
         risks.append((1 - known[np.arange(400), said]).mean())
         wrong.append((said != scenes.state).astype(float))

@@ -34,7 +34,6 @@ vision:
   seeds: 2
   train_images: 400
   prototype_images: 20000
-  network_images: 20000
   check_images: 100
   test_images: 100
   street: {columns: 3, rows: 2, heads: 1, brake_lamps: 1, street_lamps: 1, train_images: 20, test_images: 20}

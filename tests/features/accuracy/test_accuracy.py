@@ -28,6 +28,7 @@ scenarios:
 
 
 @pytest.mark.long
+@pytest.mark.slow
 def test_presets_are_measured_in_every_scene(tmp_path: Path) -> None:
     path = tmp_path / "two.yaml"
     path.write_text(TWO_SCENES)
