@@ -57,7 +57,7 @@ def score(folder: Path | str, predictions: Sequence[Path | str], *, output: Path
         Folder of a finished run of a study with `vision`.
     predictions : sequence of path-like
         For each reader a CSV or Parquet file: image_id, and state or a probability of each. Detections in streets are
-        results of COCO (.json), a folder of these or of YOLO's text files, or a table with x_px, y_px, state and score.
+        results of COCO (.json), or a folder of these or of YOLO's text files.
     output : path-like, optional
         Folder of ``scores.parquet`` (heads), ``street_scores.parquet`` and ``scores.html``; left out, FOLDER/scores.
 
@@ -113,8 +113,8 @@ _LIMITS = {
     "streets": (
         "Lenses stand in the street's order; images of the test, of lamps that training does not show. Means over the seeds, each scored apart.",
         "95 % intervals are from draws of the scenes of each light level, the same for all designs: for these lamps and this detector as it was trained.",
-        "A box is found that overlaps one of its state by 0.5 (AP50) or by 0.5 to 0.95 (AP), a point within a lens's diameter. A false box counts "
-        "at the distance whose boxes are nearest in size, a false point at all, and both at all intensities.",
+        "A box is found that overlaps one of its state by 0.5 (AP50) or by 0.5 to 0.95 (AP). A false box counts at the distance whose boxes are "
+        "nearest in size, and at all intensities.",
     ),
     "images": ("Lamps that training does not show. 95 % intervals are Student's t over the seeds.",),
 }

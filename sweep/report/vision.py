@@ -13,8 +13,7 @@ from scipy.stats import rankdata
 
 from ..base.types import Array, Bool, BoolArray, Float, IndexArray, Int
 from ..results.output import Output
-from ..results.tables import RGGB, VISION, VISION_CONDITIONS, VISION_LEARNING, VISION_STREET
-from ..vision.detections import ALL, precision_scores
+from ..results.tables import RGGB, VISION, VISION_CONDITIONS, VISION_LEARNING
 from ..vision.readers import OBSERVER
 from ..vision.scenes import PROTOTYPES, SHUFFLED, UNSEEN, states_of
 from ..vision.scores import Interval, confusion_matrix, interval_of_seeds, mean_of
@@ -296,9 +295,7 @@ def vision_answer(run: Run) -> Answer:
         "reader": READER_NAMES[reader], "by": READER_NAMES[OBSERVER], "quantity": words_of(run.goal),
         "rank": "unknown" if between is None else f"{between.value:.2f} ({between.low:.2f} to {between.high:.2f})",
     }  # fmt: skip
-    return Answer(
-        "vision", lead, facts, [*_predictors(benchmark, ranks), *_streets(run, benchmark), *_lessons(benchmark)]
-    )
+    return Answer("vision", lead, facts, [*_predictors(benchmark, ranks), *_lessons(benchmark)])
 
 
 def _shares(label: str, intervals: Mapping[str, Interval], group: str = "wrong") -> tuple[Column, dict[str, Marks]]:
@@ -352,31 +349,6 @@ def _correlations(label: str, known: Mapping[str, Interval]) -> tuple[Column, di
         for name, one in known.items()
     }
     return Column(label, axis=Axis("", "", -1.0, 1.0, level=0.0)), cells
-
-
-def _streets(run: Run, benchmark: Benchmark) -> list[Section]:
-    """Return the average precision of the simplest detector in streets."""
-    if VISION_STREET not in run.output.vision:
-        return []
-    scores = precision_scores(run.output.vision[VISION_STREET], benchmark.reference)
-    rows = scores[scores["level"] == ALL].to_dict("records")
-    precision = {str(row["name"]): float(row["average_precision"]) for row in rows}
-    apart = {
-        str(row["name"]): f"{row['apart']:+.3f} ({row['apart_low']:+.3f} to {row['apart_high']:+.3f})".replace(
-            "-", "\u2212"
-        )
-        for row in rows
-        if row["name"] != benchmark.reference
-    }
-    columns: dict[str, tuple[Column, Mapping[str, Any]]] = {
-        "precision": (Column("average precision", "", "more"), precision),
-        "apart": (Column(f"less that of {benchmark.reference}"), apart),
-    }
-    return [
-        Section(
-            "Streets, read by the simplest detector", Table.of(columns, reference=benchmark.reference, hero=run.hero)
-        )
-    ]
 
 
 def _lessons(benchmark: Benchmark) -> list[Section]:

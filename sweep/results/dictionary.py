@@ -196,8 +196,6 @@ FILES = {
     "smallest or the largest over the pairs of lenses",
     files.VISION_LEARNING: "of readers that learn, by the number of `images` that they have learned from, distance and "
     "level of light, lenses in any order: `error`, `risk` (to expect by the ideal observer), `observer_risk`",
-    files.VISION_STREET: "of streets: average_precision of the simplest detector for each design, seed, light level "
-    "and signal type (`state`), of `lit` lit lenses",
     files.ALL_SENSORS: "of a study of several sensors, one filter for all of them and one for all but each: "
     "`designed_on`, space, sensor, lights, `judged` (it was not designed on this one), objective, sensitivities, "
     "violation, `own_best` (objective of the best filter of this one alone) and parameters",

@@ -42,8 +42,8 @@ COMBINATIONS, MAP = "combinations.parquet", "map.parquet"
 HANDOVERS, WORST, SATURATED = "handovers.parquet", "worst.parquet", "saturated.parquet"
 LEFT_OUT = "leave_one_out.parquet"
 VISION, VISION_CONDITIONS = "vision.parquet", "vision_conditions.parquet"
-VISION_LEARNING, VISION_STREET = "vision_learning.parquet", "vision_street.parquet"
-VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_LEARNING, VISION_STREET)
+VISION_LEARNING = "vision_learning.parquet"
+VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_LEARNING)
 """Tables of the benchmark of vision: a row per image, per distance and level, per reader and number of images
 that it has learned from, and per light level and state of detections in streets."""
 TILES = "tiles.parquet"

@@ -1,4 +1,4 @@
-"""Files of detections in streets: COCO results, folders of YOLO, and tables of points."""
+"""Files of detections in streets: COCO results, and folders of YOLO."""
 
 from __future__ import annotations
 
@@ -12,11 +12,8 @@ import pandas as pd
 from ..base.disk import read_input
 from ..base.errors import DataError, ValidationIssue, nearest
 from ..spectra.read_text import number_of
-from ..vision.boxes import HEAD, POINT, Category
-from ..vision.detections import points_of
-from .score import issue_of, numbers_of, table_of
+from ..vision.boxes import Category
 
-COLUMNS = ("image_id", "x_px", "y_px", "state", "score")
 _BOX = ("left", "top", "width", "height")
 _MOST_BYTES = 500_000_000
 _MOST = 1e9
@@ -29,8 +26,8 @@ Shape = tuple[int, int]
 
 
 def is_of_streets(path: Path) -> bool:
-    """Return whether answers are detections: a folder, COCO results, or a table with positions."""
-    return path.is_dir() or path.suffix.lower() == ".json" or "x_px" in table_of(path)
+    """Return whether answers are detections: a folder, or COCO results."""
+    return path.is_dir() or path.suffix.lower() == ".json"
 
 
 def reader_name(path: Path) -> str:
@@ -41,17 +38,12 @@ def reader_name(path: Path) -> str:
 def read_detections(
     path: Path, labels: pd.DataFrame, categories: Sequence[Category], shape: Callable[[str], Shape]
 ) -> pd.DataFrame:
-    """Read detections: `name`, `seed` and `image` of the street, `kind`, `state`, box or place, `score`.
+    """Read detections: `name`, `seed` and `image` of the street, `kind`, `state`, box, `score`.
 
     `labels`: of the streets of the test; `shape`: rows and columns of the images of a CFA. Raises DataError for what
     cannot be read, for other images and categories, and what is no number.
     """
-    if path.is_dir():
-        found = _of_folder(path, labels, categories, shape)
-    elif path.suffix.lower() == ".json":
-        found = _of_coco(path, labels, categories, shape)
-    else:
-        found = _of_table(path, labels, [category.state for category in categories if category.kind != HEAD])
+    found = (_of_folder if path.is_dir() else _of_coco)(path, labels, categories, shape)
     return found.merge(labels[["image_id", "name", "seed", "image"]], on="image_id")
 
 
@@ -190,27 +182,3 @@ def _text(path: Path) -> str:
 
 def _frame(rows: Sequence[tuple[Any, ...]]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["image_id", "kind", "state", *_BOX, "score"])
-
-
-def _of_table(path: Path, labels: pd.DataFrame, lenses: Sequence[str]) -> pd.DataFrame:
-    """Read CSV or Parquet: a row each; positions are from the center of the first pixel."""
-    table = table_of(path)
-    missing = [name for name in COLUMNS if name not in table]
-    if missing:
-        raise DataError(ValidationIssue("a column is missing", str(path), None, None, missing[0], ", ".join(COLUMNS)))
-    issues = []
-    ids, states = table["image_id"].astype(str), table["state"].astype(str)
-    others, unknown = ids[~ids.isin(labels["image_id"])], states[~states.isin(lenses)]
-    if len(others):
-        issues.append(issue_of("not an image of a street of the test", path, others, "image_id"))
-    if len(unknown):
-        near = nearest(unknown.iloc[0], lenses)
-        issues.append(issue_of("no signal type", path, unknown, "state", ", ".join(lenses), near))
-    numbers = {name: numbers_of(table[name]) for name in ("x_px", "y_px", "score")}
-    for name, values in numbers.items():
-        wrong = table[name][~(values.abs() < _MOST)].astype(str)
-        if len(wrong):
-            issues.append(issue_of("no number", path, wrong, name, "a number"))
-    if issues:
-        raise DataError(issues)
-    return points_of(pd.DataFrame({"image_id": ids, "kind": POINT, "state": states, **numbers}))

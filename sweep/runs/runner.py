@@ -40,7 +40,6 @@ from ..results.tables import (
     SEARCHED,
     SWEPT,
     TILES,
-    VISION_STREET,
     VISION_TABLES,
     json_of,
     read_table,
@@ -86,8 +85,7 @@ _CHECK_S, _CHECK_SHARE = 0.5, 0.05
 
 def files_of(study: Study) -> set[str]:
     """Return the names of the files that a run makes."""
-    vision = study.section.vision
-    of_vision = [name for name in VISION_TABLES if vision and (vision.street or name != VISION_STREET)]
+    of_vision = VISION_TABLES if study.section.vision is not None else ()
     return {RESOLVED, *_whole(study), *row_tables(study), *of_vision}
 
 

@@ -68,7 +68,7 @@ def street_scores(output: Output, reader: str, detections: pd.DataFrame, labels:
             images = of_seed[of_seed["name"] == name]
             targets = targets_of(images, kind, shape_of(output, images["cfa"].iloc[0]))
             own = detections["seed"].eq(number) & detections["name"].eq(name) & detections["kind"].eq(kind)
-            judge = judge_of(kind, _states(vision, kind), targets, detections[own], levels, draws)
+            judge = judge_of(_states(vision, kind), targets, detections[own], levels, draws)
             judges.setdefault(kind, {}).setdefault(name, []).append(judge)
     tables = []
     for kind, by_name in judges.items():
@@ -139,9 +139,7 @@ def street_lines(scores: pd.DataFrame) -> Iterator[str]:
         first = rows["name"].iloc[0]
         for row in rows.to_dict("records"):
             text = f"{reader}, {kind}s, {row['name']}: average precision {_told(row, 'ap50')}"
-            text += (
-                f", over overlaps of 0.5 to 0.95 {_told(row, 'ap')}" if "ap" in row and np.isfinite(row["ap"]) else ""
-            )
+            text += f", over overlaps of 0.5 to 0.95 {_told(row, 'ap')}" if np.isfinite(row["ap"]) else ""
             if row["name"] != first:
                 note = "" if row["ap50_apart_low"] > 0 or row["ap50_apart_high"] < 0 else ", not told apart"
                 text += f"; {_told(row, 'ap50_apart', '+')} against {first}{note}"

@@ -17,7 +17,7 @@ from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
 from ..metrics.evaluate import evaluate
 from ..metrics.separation import csd_name
 from ..results.designs import named_rows, row_curves
-from ..results.tables import SEARCHED, VISION, VISION_CONDITIONS, VISION_LEARNING, VISION_STREET
+from ..results.tables import SEARCHED, VISION, VISION_CONDITIONS, VISION_LEARNING
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..vision.images import setup_at
@@ -56,9 +56,6 @@ _LEARNING = pa.schema(
         *(("test_images", _COUNT), ("error", _NUMBER), ("risk", _NUMBER), ("observer_risk", _NUMBER)),
     ]
 )
-_STREET = pa.schema(
-    [*_DESIGN, ("seed", _COUNT), ("level", _TEXT), ("state", _TEXT), ("lit", _COUNT), ("average_precision", _NUMBER)]
-)
 
 
 def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> dict[str, pa.Table]:
@@ -75,14 +72,12 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     pairs = [(at, seed) for seed in range(vision.seeds) for at in range(len(designs))]
     calls = [delayed(read_images, *setups[at], vision, (study.section.seed, seed)) for at, seed in pairs]
     images: list[dict[str, Any]] = []
-    detected: list[dict[str, Any]] = []
     learning: list[dict[str, Any]] = []
     readings = run_with_progress(parallel, calls, "images read (designs x seeds)", progress)
     for (at, seed), reading in zip(pairs, readings, strict=True):
         design = {name: designs[at][name] for name, _ in _DESIGN}
         images += _image_rows(study, vision, design | {"seed": seed}, reading)
         learning += _learning_rows(design | {"seed": seed}, vision, reading)
-        detected += _street_rows(design | {"seed": seed}, vision, reading)
     conditions: list[dict[str, Any]] = []
     known = parallel([delayed(predictors, *setup, vision) for setup in setups])
     for row, figures in zip(designs, known, strict=True):
@@ -90,14 +85,11 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
             conditions.append(
                 dict(zip(_CONDITIONS.names, (*(row[n] for n, _ in _DESIGN), *condition, *values), strict=True))
             )
-    tables = {
+    return {
         VISION: pa.Table.from_pylist(images, schema=_IMAGES),
         VISION_CONDITIONS: pa.Table.from_pylist(conditions, schema=_CONDITIONS),
         VISION_LEARNING: pa.Table.from_pylist(learning, schema=_LEARNING),
     }
-    if vision.street is not None:
-        tables[VISION_STREET] = pa.Table.from_pylist(detected, schema=_STREET)
-    return tables
 
 
 def vision_designs(study: Study, rows: pd.DataFrame) -> list[tuple[dict[Any, Any], Setup, DesignParameters]]:
@@ -161,13 +153,6 @@ def _learning_rows(key: dict[str, Any], vision: Vision, reading: SeedReading) ->
                 "risk": float(risk[here].mean()),
             }
             yield key | row | {"observer_risk": float((1 - least.max(axis=1))[here].mean())}
-
-
-def _street_rows(key: dict[str, Any], vision: Vision, reading: SeedReading) -> Iterator[dict[str, Any]]:
-    for level, precisions, lit in zip(vision.levels, reading.precision, reading.lit, strict=False):
-        for state, precision, count in zip(vision.lenses, precisions, lit, strict=True):
-            row = {"level": level, "state": state, "lit": int(count), "average_precision": float(precision)}
-            yield key | row
 
 
 def predictors(setup: Setup, curves: ChannelCurves, vision: Vision) -> list[tuple[float, float, float]]:

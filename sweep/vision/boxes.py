@@ -1,4 +1,4 @@
-"""What a detector of streets is asked for: boxes around heads and around lit lenses, or the centers of lit lenses."""
+"""What a detector of streets is asked for: boxes around heads and around lit lenses."""
 
 from __future__ import annotations
 
@@ -7,18 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..base.types import Array, Float
 from .scenes import states_of
 from .section import Vision
 
-HEAD, LAMP, POINT = "head", "lamp", "point"
-"""Kinds of targets: the housing, a lit lens, and its center."""
-_LEAST_RADIUS_PX = 2.0
-
-
-def match_radius_px(diameter_px: Float[Array, " targets"]) -> Float[Array, " targets"]:
-    """Return how far a point may be from the center of a lit lens: its diameter, and at least 2 pixels."""
-    return np.asarray(np.maximum(diameter_px, _LEAST_RADIUS_PX), dtype=float)
+HEAD, LAMP = "head", "lamp"
+"""Kinds of targets: the housing, and a lit lens."""
 
 
 class Category(NamedTuple):
@@ -38,12 +31,11 @@ def categories_of(vision: Vision) -> list[Category]:
     return [Category(HEAD, state) for state in states_of(vision)] + [Category(LAMP, lens) for lens in vision.lenses]
 
 
-def targets_of(labels: pd.DataFrame, kind: str, shape: tuple[int, int] = (0, 0)) -> pd.DataFrame:
+def targets_of(labels: pd.DataFrame, kind: str, shape: tuple[int, int]) -> pd.DataFrame:
     """Return the targets of a kind in streets, each a row.
 
-    `labels`: of `street_labels`; `shape`: rows and columns of the images, at whose edge boxes are cut, and no points. A
-    box is `left`, `top`, `width` and `height` from the edge of the first pixel; a point is x and y from its center, and
-    how far a detection may be from it.
+    `labels`: of `street_labels`; `shape`: rows and columns of the images, at whose edge boxes are cut. A box is `left`,
+    `top`, `width` and `height` from the edge of the first pixel.
     """
     lists = ["state", "distance_m", "intensity_cd", "lens_diameter_px", "head_x_px", "head_y_px", "lit_y_px"]
     lists += ["head_width_px", "head_height_px"]
@@ -54,15 +46,12 @@ def targets_of(labels: pd.DataFrame, kind: str, shape: tuple[int, int] = (0, 0))
         rows = rows[np.isfinite(rows["lit_y_px"])]
     diameter = rows["lens_diameter_px"]
     x, y = rows["head_x_px"], rows["head_y_px"] if kind == HEAD else rows["lit_y_px"]
-    if kind == POINT:
-        place = {"left": x, "top": y, "width": match_radius_px(diameter.to_numpy(dtype=float)), "height": 0.0}
-    else:
-        sizes = (rows["head_width_px"], rows["head_height_px"]) if kind == HEAD else (diameter, diameter)
-        ends = [
-            [np.clip(middle + 0.5 + side * size / 2, 0, most) for side in (-1, 1)]
-            for middle, size, most in zip((x, y), sizes, shape[::-1], strict=True)
-        ]
-        (left, right), (top, bottom) = ends
-        place = {"left": left, "top": top, "width": right - left, "height": bottom - top}
+    sizes = (rows["head_width_px"], rows["head_height_px"]) if kind == HEAD else (diameter, diameter)
+    ends = [
+        [np.clip(middle + 0.5 + side * size / 2, 0, most) for side in (-1, 1)]
+        for middle, size, most in zip((x, y), sizes, shape[::-1], strict=True)
+    ]
+    (left, right), (top, bottom) = ends
+    place = {"left": left, "top": top, "width": right - left, "height": bottom - top}
     kept = rows[["image_id", "image", "level", "state", "distance_m", "intensity_cd"]]
     return pd.concat([kept, pd.DataFrame(place, index=rows.index)], axis=1)

@@ -11,10 +11,8 @@ _SURELY = 1 - 1e-10
 
 
 @njit(cache=True, nogil=True)
-def _overlap(found: NDArray[np.float64], target: NDArray[np.float64], is_point: bool) -> float:
-    """Return the intersection of two boxes over their union; of a point, 1 less its distance over two radii."""
-    if is_point:
-        return float(1 - np.hypot(found[0] - target[0], found[1] - target[1]) / (2 * target[2]))
+def _overlap(found: NDArray[np.float64], target: NDArray[np.float64]) -> float:
+    """Return the intersection of two boxes over their union."""
     wide = min(found[0] + found[2], target[0] + target[2]) - max(found[0], target[0])
     high = min(found[1] + found[3], target[1] + target[3]) - max(found[1], target[1])
     if wide <= 0 or high <= 0:
@@ -30,12 +28,11 @@ def match(
     targets: NDArray[np.float64],
     of_targets: NDArray[np.intp],
     thresholds: NDArray[np.float64],
-    is_point: bool,
     out: NDArray[np.intp],
 ) -> None:
     """Write the target that each detection finds at each threshold, or -1, as pycocotools does.
 
-    `found`: by image, best first, left, top, width and height (or x and y); `of_found`, `of_targets`: first of each
+    `found`: by image, best first, left, top, width and height; `of_found`, `of_targets`: first of each
     image. A detection takes the target with the largest overlap that no better one has taken; of equal ones the last.
     """
     for at in range(thresholds.size):
@@ -45,7 +42,7 @@ def match(
                 best, which = min(thresholds[at], _SURELY), -1
                 for j in range(of_targets[image], of_targets[image + 1]):
                     if not taken[j]:
-                        overlap = _overlap(found[i], targets[j], is_point)
+                        overlap = _overlap(found[i], targets[j])
                         if overlap >= best:
                             best, which = overlap, j
                 out[at, i] = which

@@ -1,7 +1,7 @@
 """Scores of detections: average precision as pycocotools has it, and the share that is found, with intervals.
 
 A detection is right that overlaps a target of its state which no better one has found: by 0.5 (intersection over union)
-or by 0.5, 0.55 ... 0.95, averaged; a point that is near enough. Precision is averaged at 101 recalls.
+or by 0.5, 0.55 ... 0.95, averaged. Precision is averaged at 101 recalls.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,10 +16,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..base.types import Array, Float, FloatArray, IndexArray, Int
-from .boxes import POINT, targets_of
 from .detection_kernels import average_precisions, match
 from .scenes import OFF
-from .scores import CONFIDENCE, Interval, interval_of_seeds
+from .scores import CONFIDENCE, Interval
 
 ALL = "all"
 """In place of a state, light level, distance or intensity: all of them."""
@@ -48,7 +46,7 @@ class Matched(NamedTuple):
     distance_m: Float[Array, " detections"]
 
 
-def match_detections(targets: pd.DataFrame, found: pd.DataFrame, kind: str) -> Matched:
+def match_detections(targets: pd.DataFrame, found: pd.DataFrame) -> Matched:
     """Match detections of a state with its targets.
 
     `targets`: of `targets_of`; `found`: `image`, `left`, `top`, `width`, `height`, `score`.
@@ -59,18 +57,17 @@ def match_detections(targets: pd.DataFrame, found: pd.DataFrame, kind: str) -> M
     n_images = 1 + int(max([*targets["image"], *found["image"]], default=0))
     starts = [np.searchsorted(table["image"].to_numpy(), np.arange(n_images + 1)) for table in (found, targets)]
     boxes = [table[["left", "top", "width", "height"]].to_numpy(dtype=float) for table in (found, targets)]
-    thresholds = _THRESHOLDS[:1] if kind == POINT else _THRESHOLDS
-    target = np.empty((thresholds.size, len(found)), dtype=np.intp)
-    match(boxes[0], starts[0], boxes[1], starts[1], thresholds, kind == POINT, target)
+    target = np.empty((_THRESHOLDS.size, len(found)), dtype=np.intp)
+    match(boxes[0], starts[0], boxes[1], starts[1], _THRESHOLDS, target)
     by_score = np.argsort(-found["score"].to_numpy(dtype=float), kind="stable")
     image, score = (found[name].to_numpy()[by_score] for name in ("image", "score"))
     sizes = np.sqrt(boxes[0][:, 2] * boxes[0][:, 3])[by_score]
-    return Matched(targets, target[:, by_score], image, score, _distances(targets, sizes, kind))
+    return Matched(targets, target[:, by_score], image, score, _distances(targets, sizes))
 
 
-def _distances(targets: pd.DataFrame, sizes: Float[Array, " detections"], kind: str) -> Float[Array, " detections"]:
+def _distances(targets: pd.DataFrame, sizes: Float[Array, " detections"]) -> Float[Array, " detections"]:
     """Return the distance whose targets are nearest in size."""
-    if kind == POINT or targets.empty:
+    if targets.empty:
         return np.full(len(sizes), np.nan)
     area = (targets["width"] * targets["height"]).groupby(targets["distance_m"]).median()
     known = np.log(np.sqrt(np.maximum(area.to_numpy(dtype=float), 1e-12)))
@@ -163,8 +160,6 @@ class Judge:
     def statistics(self, of: Subset) -> dict[str, Float[Array, " draws"]]:
         """Return average precision at 0.5 and over all thresholds, average recall, and recall at `FALSE_PER_IMAGE`."""
         precision, recall = self.precisions(of)
-        if precision.shape[1] == 1:  # points
-            return {"ap50": precision[:, 0], "found": self.found(of)}
         whole = {"ap50": precision[:, 0], "ap": precision.mean(axis=1), "recall": recall.mean(axis=1)}
         return whole | {"found": self.found(of)}
 
@@ -179,7 +174,6 @@ def _mean(parts: Sequence[FloatArray]) -> FloatArray:
 
 
 def judge_of(
-    kind: str,
     states: Sequence[str],
     targets: pd.DataFrame,
     found: pd.DataFrame,
@@ -188,8 +182,7 @@ def judge_of(
 ) -> Judge:
     """Match the detections of a design and seed: columns as of `match_detections`, and `state`."""
     by_state = {
-        state: match_detections(targets[targets["state"] == state], found[found["state"] == state], kind)
-        for state in states
+        state: match_detections(targets[targets["state"] == state], found[found["state"] == state]) for state in states
     }
     return Judge(by_state, levels, weights)
 
@@ -240,46 +233,3 @@ def _interval(values: Float[Array, " draws"]) -> Interval:
         return Interval(float(values[0]), np.nan, np.nan)
     low, high = np.quantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
     return Interval(float(values[0]), float(2 * values[0] - high), float(2 * values[0] - low))
-
-
-def precisions(labels: pd.DataFrame, detections: pd.DataFrame, lenses: Sequence[str]) -> pd.DataFrame:
-    """Return the average precision of points of each signal type in the images of each light level.
-
-    Columns `level`, `state`, `lit` (number of lit lenses), `average_precision`; of detections `image_id`, `x_px`,
-    `y_px`, `state`, `score`.
-    """
-    targets, levels = targets_of(labels, POINT), labels["level"].to_numpy()
-    found = points_of(detections).merge(labels[["image_id", "image"]], on="image_id")
-    judge = judge_of(POINT, lenses, targets, found, levels, np.ones((1, len(labels))))
-    rows = []
-    for level, state in product(dict.fromkeys(levels.tolist()), lenses):
-        lit = int(((targets["level"] == level) & (targets["state"] == state)).sum())
-        precision = judge.precisions(Subset(state=state, level=level))[0][0, 0]
-        rows.append({"level": level, "state": state, "lit": lit, "average_precision": float(precision)})
-    return pd.DataFrame(rows)
-
-
-def points_of(detections: pd.DataFrame) -> pd.DataFrame:
-    """Return places (`x_px`, `y_px`) as boxes without size."""
-    return detections.rename(columns={"x_px": "left", "y_px": "top"}).assign(width=0.0, height=0.0)
-
-
-def precision_scores(table: pd.DataFrame, reference: str) -> pd.DataFrame:
-    """Return average precisions, mean over signal types, with 95 % intervals over the seeds.
-
-    Returns a row per light level (first all of them) and design: `name`, `level`, `average_precision`, and `apart`, the
-    paired difference from the reference.
-    """
-    by_level = {
-        str(level): part.pivot_table("average_precision", "name", "seed", sort=False)
-        for level, part in ((ALL, table), *table.groupby("level", sort=False))
-    }
-    rows = []
-    for level, values in by_level.items():
-        for name in values.index:
-            row: dict[str, Any] = {"name": str(name), "level": level}
-            differences = values.loc[name] - values.loc[reference]
-            for column, of_seeds in (("average_precision", values.loc[name]), ("apart", differences)):
-                row |= interval_of_seeds(float(of_seeds.mean()), np.array(of_seeds, dtype=float)).columns(column)
-            rows.append(row)
-    return pd.DataFrame(rows)

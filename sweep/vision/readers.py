@@ -13,19 +13,14 @@ from ..base.types import Array, ChannelCurves, Float, ImageNumbers, IndexArray, 
 from ..camera.setup import Setup
 from .batches import scene_key, scenes_of
 from .crops import Crops, Seen
-from .detections import precisions
-from .detector import Detector
 from .images import HeadCamera
-from .lamps import CHECK, TEST, TRAIN, Lamps, split_lamps
+from .lamps import CHECK, TEST, TRAIN, split_lamps
 from .observer import posteriors
 from .prototypes import Prototypes
 from .scenes import FIXED, ORDERS, PROTOTYPES, SHUFFLED, Scenes, draw_scenes
 from .section import Vision
-from .street import StreetCamera, draw_streets, street_labels
 
 _KNOWN_KEY = 1
-_KEY = {"design_id": 0, "name": "", "cfa": "", "seed": 0}
-"""Labels of images that are not written to files."""
 OBSERVER = "observer"
 _SHARES = (1 / 64, 1 / 8, 1.0)
 """Of the images of training: error over images."""
@@ -44,15 +39,11 @@ class SeedReading:
     """Answers of one seed by order of the lenses, on lamps that the readers have not learned from, and on those.
 
     `learning`: answers to the unseen images in any order by readers of some images: name, their number, and states.
-    `precision` is that of a detector in streets and `lit` the number of lit lenses, by level
-    and lens. Without streets they are empty.
     """
 
     unseen: dict[str, Answers]
     seen: dict[str, Answers]
     learning: list[tuple[str, int, Int[IndexArray, " images"]]]
-    precision: Float[Array, "streets lenses"]
-    lit: Int[IndexArray, "streets lenses"]
 
 
 def read_images(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tuple[int, int]) -> SeedReading:
@@ -84,7 +75,7 @@ def read_images(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tuple
         scale = 1 / _temperature(reader.log_probabilities(of_check), check.state)
         for answers, own in shown:
             answers.probabilities[PROTOTYPES] = softmax(scale * reader.log_probabilities(own), axis=1)
-    return SeedReading(unseen, seen, learning, *_streets(camera, lamps, seed))
+    return SeedReading(unseen, seen, learning)
 
 
 def _temperature(logs: Float[Array, "images states"], states: ImageNumbers) -> float:
@@ -95,24 +86,6 @@ def _temperature(logs: Float[Array, "images states"], states: ImageNumbers) -> f
         return -float(np.take_along_axis(log_shares, states[:, None], axis=1).mean())
 
     return math.exp(minimize_scalar(loss, bounds=(-2.0, 3.0), method="bounded").x)
-
-
-def _streets(
-    camera: HeadCamera, lamps: dict[str, Lamps], seed: tuple[int, int]
-) -> tuple[Float[Array, "images lenses"], Int[IndexArray, "images lenses"]]:
-    """Return the precision of the simplest detector, and the number of lit lenses."""
-    vision, design = camera.vision, camera.setup.camera
-    if vision.street is None:
-        return np.empty((0, 0)), np.empty((0, 0), dtype=np.intp)
-    streets, key = StreetCamera(camera, vision.street), _KEY | {"seed": seed[1]}
-    learned, test = (draw_streets(vision, vision.street, split, seed) for split in (TRAIN, TEST))
-    detector = Detector(design.mosaic, camera.pixel, vision.lenses)
-    detector.learn(streets.batches(learned, lamps[TRAIN], key, TRAIN, "raw"))
-    detections = detector.detect(streets.batches(test, lamps[TEST], key, TEST, "raw"))
-    labels, shape = street_labels(vision, design.mosaic, test, key, TEST), (-1, len(vision.lenses))
-    table = precisions(labels, detections, vision.lenses)
-    precision, lit = table["average_precision"].to_numpy(dtype=float), table["lit"].to_numpy(dtype=np.intp)
-    return precision.reshape(shape), lit.reshape(shape)
 
 
 def observer_error(setup: Setup, curves: ChannelCurves, vision: Vision, seed: tuple[int, int]) -> float:

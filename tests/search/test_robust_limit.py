@@ -64,7 +64,7 @@ def test_over_all_places_it_is_a_bracket_of_the_worst_one() -> None:
     assert 0 <= found.proven - found.attained <= 0.02
     assert found.proven <= limit().proven + 1e-6
     least = smallest_csd_at(given.setup, np.linspace(0, 20, 200), found.curve)
-    assert found.attained <= least <= found.attained + 0.02
+    assert found.attained * (1 - 1e-12) <= least <= found.attained + 0.02
 
 
 @pytest.fixture(scope="module")

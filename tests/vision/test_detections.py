@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.vision.boxes import HEAD, POINT
 from sweep.vision.detections import Subset, draws_of, judge_of, scores_of_draws
 
 from ..late import Late
@@ -70,7 +69,7 @@ def by_pycocotools(targets: pd.DataFrame, found: pd.DataFrame, n_images: int) ->
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_random_detections_score_as_with_pycocotools(seed: int) -> None:
     targets, found = random_boxes(seed)
-    own = judge_of(HEAD, STATES, targets, found, np.full(60, "day"), np.ones((1, 60))).statistics(Subset())
+    own = judge_of(STATES, targets, found, np.full(60, "day"), np.ones((1, 60))).statistics(Subset())
     wanted = by_pycocotools(targets, found, 60)
     assert 0.05 < wanted[0] < wanted[1] < 0.9
     np.testing.assert_allclose([own["ap"][0], own["ap50"][0], own["recall"][0]], wanted, atol=1e-12)
@@ -81,10 +80,10 @@ def test_a_weight_is_an_image_more() -> None:
     targets, found = random_boxes(4, 20, 300)
     found["score"] += 1e-6 * np.arange(len(found))  # no two are equal
     times = np.arange(20) % 3
-    own = judge_of(HEAD, STATES, targets, found, np.full(20, "day"), times[None].astype(float)).statistics(Subset())
+    own = judge_of(STATES, targets, found, np.full(20, "day"), times[None].astype(float)).statistics(Subset())
     twice = [pd.concat([table, table.assign(image=table["image"] + 20)]) for table in (targets, found)]
     there = np.concatenate([times >= 1, times == 2]).astype(float)[None]
-    copied = judge_of(HEAD, STATES, *twice, np.full(40, "day"), there).statistics(Subset())
+    copied = judge_of(STATES, *twice, np.full(40, "day"), there).statistics(Subset())
     for name in ("recall", "found"):
         assert own[name][0] == pytest.approx(copied[name][0]), name
     # The second of two equal scores has a precision of its own.
@@ -100,7 +99,7 @@ def test_what_is_found_at_few_false_boxes() -> None:
     targets = targets.assign(**place)
     found = targets[["image", "state", *BOX]].assign(score=np.linspace(0.95, 0.5, 10))
     false = found.iloc[:3].assign(left=50.0, score=[0.82, 0.72, 0.62])
-    judge = judge_of(HEAD, ("off", "red"), targets, pd.concat([found, false]), np.full(10, "day"), np.ones((1, 10)))
+    judge = judge_of(("off", "red"), targets, pd.concat([found, false]), np.full(10, "day"), np.ones((1, 10)))
     allowed = np.floor(10 * np.geomspace(0.03, 0.3, 9) + 1e-9)
     wanted = np.array([0.3, 0.5, 0.7, 1.0])[allowed.astype(int)].mean()  # above 0.82, 0.72, 0.62, and all
     assert judge.found(Subset())[0] == pytest.approx(wanted)
@@ -114,7 +113,7 @@ def test_a_false_box_counts_at_the_distance_of_its_size() -> None:
     )
     found = targets[["image", "state", *BOX]].assign(score=0.5)
     false = found.iloc[:1].assign(left=50.0, score=0.9)
-    judge = judge_of(HEAD, ("red",), targets, pd.concat([found, false]), np.full(2, "day"), np.ones((1, 2)))
+    judge = judge_of(("red",), targets, pd.concat([found, false]), np.full(2, "day"), np.ones((1, 2)))
     near, far, all_of = (
         judge.statistics(of)["ap50"][0] for of in (Subset(distance_m=100.0), Subset(distance_m=400.0), Subset())
     )
@@ -129,7 +128,7 @@ def simulated(rng: np.random.Generator, n_images: int) -> tuple[pd.DataFrame, di
     image = np.repeat(np.arange(n_images), n)
     hard = np.repeat(rng.normal(size=n_images), n) + 0.5 * rng.normal(size=image.size)
     targets = pd.DataFrame({"image": image, "state": "red", "distance_m": 100.0, "intensity_cd": 1.0})
-    targets = targets.assign(left=20.0 * np.arange(image.size), top=5.0, width=4.0, height=0.0)
+    targets = targets.assign(left=20.0 * np.arange(image.size), top=5.0, width=4.0, height=4.0)
     targets["level"] = np.where(image % 2 == 0, "day", "night")
     told = {}
     for name, better in (("first", 0.0), ("second", 0.3)):
@@ -148,7 +147,7 @@ def judges_of(rng: np.random.Generator, n_images: int, seeds: int, draws: bool) 
         levels = np.where(np.arange(n_images) % 2 == 0, "day", "night")
         weights = draws_of(levels, (seed, int(rng.integers(2**31)))) if draws else np.ones((1, n_images))
         for name, found in told.items():
-            judges[name].append(judge_of(POINT, ("red",), targets, found, levels, weights))
+            judges[name].append(judge_of(("red",), targets, found, levels, weights))
     return judges
 
 

@@ -236,7 +236,6 @@ def test_perfect_boxes_come_back(run: Path, pictures: Path, tmp_path: Path) -> N
 
 
 ROW = '[{"image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4], "score": 0.5}]'
-POINTS = "image_id,x_px,y_px,state,score\n"
 
 
 @pytest.mark.parametrize(
@@ -260,9 +259,6 @@ POINTS = "image_id,x_px,y_px,state,score\n"
         ("mine/0-0-street-test-0.txt", "0 0.5 0.5 0.1 0.1 90", ":1: no box"),
         ("mine.json", ROW.replace("1, 2, 3, 4", "100, 20, 900, 400"), "boxes reach beyond their images"),
         ("mine/classes.txt", "0 0.5 0.5 0.1 0.1 0.9", "not an image"),
-        ("mine.csv", f"{POINTS}x,1,1,red,0.9\n", "not an image"),
-        ("mine.csv", f"{POINTS}0-0-street-test-0,1,1,yelow,0.9\n", "no signal type"),
-        ("mine.csv", f"{POINTS}0-0-street-test-0,1,1,red,much\n", "no number"),
     ],
 )
 def test_other_detections_are_refused_with_a_line(run: Path, tmp_path: Path, file: str, text: str, said: str) -> None:
@@ -271,18 +267,6 @@ def test_other_detections_are_refused_with_a_line(run: Path, tmp_path: Path, fil
     path.write_text(text)
     given = path.parent if path.suffix == ".txt" else path
     refused(said, "score", run, given, "--output", tmp_path / "scores")
-
-
-def test_points_in_streets_are_scored(run: Path, tmp_path: Path) -> None:
-    """The labels themselves are all right."""
-    exported(run, tmp_path / "raw", "--split", "test")
-    columns = ["state", "head_x_px", "lit_y_px"]
-    lit = pd.read_parquet(tmp_path / "raw" / "street.parquet")[["image_id", *columns]].explode(columns)
-    lit = lit[lit["state"] != "off"].rename(columns={"head_x_px": "x_px", "lit_y_px": "y_px"}).assign(score=0.9)
-    lit.to_csv(tmp_path / "right.csv", index=False)
-    code, out, err = commanded("score", run, tmp_path / "right.csv", "--output", tmp_path / "scores")
-    assert code == 0, err
-    assert "right, points, RGGB: average precision 1.000." in out
 
 
 def test_strips_are_parts_of_whole_images(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,20 +1,17 @@
-"""Streets: each head is that of its own image, lamps have their light, glare keeps it, and detections are counted."""
+"""Streets: each head is that of its own image, lamps have their light, and glare keeps it."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from sweep.vision.detections import precisions
-from sweep.vision.detector import Detector
 from sweep.vision.images import HeadCamera
-from sweep.vision.lamps import TEST, TRAIN, Lamps, split_lamps
+from sweep.vision.lamps import TEST, Lamps, split_lamps
 from sweep.vision.scenes import Scenes
 from sweep.vision.section import Street
-from sweep.vision.street import StreetCamera, StreetScenes, corners_px, draw_streets, street_labels
+from sweep.vision.street import StreetCamera, StreetScenes, corners_px, draw_streets
 
 from .heads import NO_FILTERS, head_setup, vision
 
@@ -29,12 +26,8 @@ def streets(cfa: str = "RGGB", **changes: Any) -> tuple[StreetCamera, StreetScen
     return camera, draw_streets(requested, street, TEST, (1, 0))
 
 
-def lamps_of(camera: StreetCamera, split: str = TEST) -> Lamps:
-    return split_lamps(camera.camera.setup.lights, camera.camera.vision, (1, 0))[split]
-
-
-def labels_of(camera: StreetCamera, scenes: StreetScenes) -> pd.DataFrame:
-    return street_labels(camera.camera.vision, camera.camera.setup.camera.mosaic, scenes, KEY, TEST)
+def lamps_of(camera: StreetCamera) -> Lamps:
+    return split_lamps(camera.camera.setup.lights, camera.camera.vision, (1, 0))[TEST]
 
 
 @pytest.mark.parametrize("cfa", ["RGGB", "RCCB"])
@@ -95,32 +88,3 @@ def test_images_do_not_depend_on_how_many_are_made_at_once() -> None:
     together = np.concatenate([batch.images for batch in camera.batches(scenes, lamps_of(camera), KEY, TEST, "raw")])
     alone = next(camera.batches(scenes.subset(slice(40, 41)), lamps_of(camera), KEY, TEST, "raw")).images
     np.testing.assert_array_equal(together[40], alone[0])
-
-
-def test_a_lens_is_found_once_and_near() -> None:
-    labels, columns = labels_of(*streets()), ["state", "head_x_px", "lit_y_px", "lens_diameter_px"]
-    lit = labels[["image_id", *columns]].explode(columns, ignore_index=True).query("state == 'red'")
-    there = lit.rename(columns={"head_x_px": "x_px", "lit_y_px": "y_px"}).assign(score=0.8)
-    reach_px = lit["lens_diameter_px"].astype(float).clip(lower=2.0)
-    near, far = (there.assign(x_px=there["x_px"] + share * reach_px, score=0.9) for share in (0.99, 1.01))
-    for made, expected in (
-        (pd.concat([near, there]), 1.0),
-        (pd.concat([far, there]), 0.5),
-        (far, 0.0),
-        (near.assign(state="green"), 0.0),
-    ):
-        np.testing.assert_allclose(precisions(labels, made, ["red"])["average_precision"], expected)
-
-
-def test_the_detector_finds_lamps_at_night() -> None:
-    """Without other lamps it finds nearly all green and yellow ones; the colors are learned from other lamps."""
-    camera, test = streets(heads=2, brake_lamps=0, street_lamps=0, test_images=40, train_images=60)
-    requested, setup = camera.camera.vision, camera.camera.setup
-    learned = draw_streets(requested, camera.street, TRAIN, (1, 0))
-    detector = Detector(setup.camera.mosaic, camera.camera.pixel, requested.lenses)
-    detector.learn(camera.batches(learned, lamps_of(camera, TRAIN), KEY, TRAIN, "raw"))
-    made = detector.detect(camera.batches(test, lamps_of(camera), KEY, TEST, "raw"))
-    table = precisions(labels_of(camera, test), made, requested.lenses).set_index(["level", "state"])
-    assert table.loc[("night", "green"), "average_precision"] > 0.9
-    assert table.loc[("night", "yellow"), "average_precision"] > 0.9
-    assert table.loc[("day", "green"), "average_precision"] < table.loc[("night", "green"), "average_precision"]
