@@ -53,7 +53,6 @@ DesignSignals = Float[Array, "designs signals channels"]
 """What the channels say of each signal, in one case."""
 DesignCases = Float[Array, "designs cases signals channels"]
 """What the channels say of each signal, at each sampling phase, field position and moment."""
-DesignPixels = Float[Array, "designs cases signals pixels"]
 ParameterWeights = Float[Array, "_conditions parameters"]
 """Linear functions of the parameters, one in a row."""
 DesignNumbers = Int[IndexArray, " designs"]

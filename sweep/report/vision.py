@@ -96,16 +96,6 @@ class Benchmark:
         rows = self._answers(SHUFFLED)
         return rows.pivot(index=["seed", "image"], columns="name", values=f"{reader}_risk")[self.designs]
 
-    def times_observer(self, design: str, reader: str, distances_m: Sequence[float]) -> Interval:
-        """Return the error to expect of a reader over that of the observer at some distances."""
-        here = self.scenes(SHUFFLED)["distance_m"].isin(distances_m).to_numpy()
-        seeds = self.seeds(SHUFFLED)[here]
-        own, least = (self.risk(name)[design].to_numpy()[here] for name in (reader, OBSERVER))
-        parts = [np.ones(len(seeds), dtype=bool), *(seeds == seed for seed in np.unique(seeds))]
-        means = np.array([[own[part].mean(), least[part].mean()] for part in parts]).T
-        times = np.divide(means[0], means[1], out=np.full(len(parts), np.nan), where=means[1] > 0)
-        return interval_of_seeds(float(times[0]), times[1:])
-
     @lru_cache  # noqa: B019
     def seeds(self, order: str, lamps: str = UNSEEN) -> Int[IndexArray, " scenes"]:
         """Return the seed of each scene of `wrong`."""

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 from ..base.errors import OutputError, ValidationIssue
 from ..base.types import Bool, BoolArray
 from ..metrics.quantity import UPPER_BOUND
-from .atomic import atomic, write_text
+from .atomic import atomic
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -175,11 +175,6 @@ def write_table(table: pa.Table, path: Path) -> None:
     """Write one Parquet file atomically, with a checksum of each page."""
     with atomic(path) as hidden:
         pq.write_table(table, hidden, **_how(table.schema))
-
-
-def write_csv(table: pd.DataFrame, path: Path) -> None:
-    """Write one CSV file with every digit, atomically."""
-    write_text(csv_of(table), path)
 
 
 def csv_of(table: pd.DataFrame) -> str:

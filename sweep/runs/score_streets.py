@@ -13,7 +13,7 @@ from ..base.errors import DataError, SweepError, ValidationIssue
 from ..results.output import Output
 from ..results.tables import VISION
 from ..vision.boxes import HEAD, targets_of
-from ..vision.detections import ALL, FALSE_PER_IMAGE, Judge, Subset, draws_of, judge_of, scores_of_draws
+from ..vision.detections import ALL, Judge, Subset, draws_of, judge_of, scores_of_draws
 from ..vision.lamps import TEST
 from ..vision.scenes import states_of
 from ..vision.section import Vision
@@ -110,26 +110,6 @@ def _subsets(vision: Vision, kind: str) -> Iterator[Subset]:
 def of_all_targets(scores: pd.DataFrame) -> pd.DataFrame:
     """Return the scores of all targets of a kind."""
     return scores[(scores[list(Subset._fields)] == ALL).all(axis=1)]
-
-
-def found_sentence(scores: pd.DataFrame, lens: str, better: str) -> str:
-    """Return which share of a signal type is found with the first design, and with another, at one distance."""
-    at = scores[(scores["state"] == lens) & (scores["distance_m"] != ALL)]
-    first = at[at["name"] == at["name"].iloc[0]]
-    if not first["found"].notna().any():
-        return f"No {lens} lamp is shown."
-    # Where the first finds nearest to 80 %: neither all nor nothing.
-    distance = first.loc[(first["found"] - 0.8).abs().idxmin(), "distance_m"]
-    here = at[at["distance_m"] == distance].set_index("name")
-    name, other = str(first["name"].iloc[0]), here.loc[better]
-    what = f"{lens} heads" if (first["kind"] == HEAD).all() else f"{lens} lamps"
-    text = (
-        f"{first['reader'].iloc[0]} finds {100 * here.loc[name, 'found']:.0f} % of {what} at {distance} m with {name}"
-    )
-    if better != name:
-        ends = [f"{100 * other[f'found_apart{end}']:+.0f}" for end in ("", "_low", "_high")]
-        text += f" and {100 * other['found']:.0f} % with {better}: {ends[0]} ({ends[1]} to {ends[2]})"
-    return f"{text}, at {FALSE_PER_IMAGE[0]:g} to {FALSE_PER_IMAGE[1]:g} false boxes an image."
 
 
 def street_lines(scores: pd.DataFrame) -> Iterator[str]:

@@ -28,16 +28,6 @@ def in_noise(raw: NDArray[np.generic], pixel: Pixel) -> Float[Array, " ..."]:
     return np.asarray(np.log1p(2 * prnu * (root + prnu * electrons)) / prnu, dtype=float)
 
 
-def tile_planes(
-    images: Float[Array, "images rows columns"], mosaic: Mosaic
-) -> Float[Array, "images _rows _columns positions"]:
-    """Return each position of the tile as a plane."""
-    rows, columns = mosaic.indices.shape
-    n, high, wide = images.shape
-    parts = images.reshape(n, high // rows, rows, wide // columns, columns)
-    return np.ascontiguousarray(np.moveaxis(parts, 2, 3).reshape(n, high // rows, wide // columns, rows * columns))
-
-
 def demosaicked(
     images: Float[Array, "*batch rows columns"], mosaic: Mosaic
 ) -> Float[Array, "... rows columns channels"]:

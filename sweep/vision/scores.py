@@ -19,11 +19,6 @@ class Interval:
     low: float
     high: float
 
-    @property
-    def excludes_zero(self) -> bool:
-        """True if the interval is on one side of 0."""
-        return self.low > 0 or self.high < 0
-
     def columns(self, name: str) -> dict[str, float]:
         """Return value and ends as columns of a table."""
         return {name: self.value, f"{name}_low": self.low, f"{name}_high": self.high}
@@ -65,16 +60,6 @@ def confusion_matrix(truth: ImageNumbers, answered: ImageNumbers, n_states: int)
     counts = np.zeros((n_states, n_states), dtype=np.intp)
     np.add.at(counts, (truth, answered), 1)
     return counts
-
-
-def macro_f1(matrix: Int[IndexArray, "states states"]) -> float:
-    """Return the mean over the states of the harmonic mean of precision and recall; 0 for a state that is never right.
-
-    Returns 0 to 1.
-    """
-    right = np.diag(matrix).astype(float)
-    total = matrix.sum(axis=0) + matrix.sum(axis=1)
-    return float(np.mean(np.divide(2 * right, total, out=np.zeros_like(right), where=total > 0)))
 
 
 def costs(

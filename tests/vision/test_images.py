@@ -22,7 +22,7 @@ from sweep.vision.images import HeadCamera, setup_at
 from sweep.vision.lamps import TEST, split_lamps
 from sweep.vision.materials import ambient_light, phantom, reflectance
 from sweep.vision.pixel_table import pixel_table
-from sweep.vision.planes import demosaicked, tile_planes
+from sweep.vision.planes import demosaicked
 from sweep.vision.scenes import SHUFFLED, Scenes, draw_scenes
 from sweep.vision.section import Material, Vision
 
@@ -159,14 +159,6 @@ def test_drawn_images_are_as_noisy_as_the_product_draws_them() -> None:
     assert np.abs(apart).max() < 5
     assert (drawn.var(axis=0) / again.var(axis=0)).mean() == pytest.approx(1.0, abs=0.01)
     np.testing.assert_array_equal(camera.images(many.subset(np.arange(3, 5))).reshape(2, -1), drawn[3:5])
-
-
-def test_planes_of_a_tile() -> None:
-    mosaic = Mosaic.from_rows("own", [["R", "G", "C"], ["B", "C", "G"]])
-    image = np.arange(2 * 12 * 12, dtype=float).reshape(2, 12, 12)
-    planes = tile_planes(image, mosaic)
-    assert planes.shape == (2, 6, 4, 6)
-    np.testing.assert_array_equal(planes[1, 2, 3], image[1, 4:6, 9:12].ravel())
 
 
 def test_demosaicking_keeps_linear_images_and_measured_pixels() -> None:
