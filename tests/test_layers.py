@@ -40,6 +40,7 @@ ONLY_USER = {
     "moocore": ["metrics/pareto"],
     "jinja2": ["report/"],
     "typer": ["cli/", "features/"],
+    "pycocotools": ["runs/score_streets"],
     "numba": ["base/machine_code", "base/lane_kernels"],
 }
 """The files, or all of a folder, that alone may import a library."""

@@ -100,7 +100,7 @@ for cfa in sorted((folder / "pictures").glob("*/annotations")):
 
 # %% [markdown]
 # Its answers, of both CFAs in one file, are read as COCO results. A box that is blurred wider than the lens overlaps it by
-# less than a half: average precision is that of boxes, the page has what is found at a few false boxes, too.
+# less than a half: average precision is that of boxes.
 
 # %%
 (folder / "blobs.json").write_text(json.dumps(answers))

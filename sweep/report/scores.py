@@ -30,14 +30,14 @@ from ..runs.score import (
 from ..runs.score_streets import (
     labels_of_test,
     of_all_targets,
+    require_pycocotools,
     shape_of,
     street_lines,
     street_scores,
     vision_with_streets,
 )
 from ..vision.boxes import categories_of
-from ..vision.detections import ALL, FALSE_PER_IMAGE
-from ..vision.scenes import SHUFFLED, states_of
+from ..vision.scenes import ALL, SHUFFLED, states_of
 from .numbers import NARROW, SHARE
 from .page import Report
 from .panels import INK, Lines, Section, axis_over
@@ -57,7 +57,7 @@ def score(folder: Path | str, predictions: Sequence[Path | str], *, output: Path
         Folder of a finished run of a study with `vision`.
     predictions : sequence of path-like
         For each reader a CSV or Parquet file: image_id, and state or a probability of each. Detections in streets are
-        results of COCO (.json), or a folder of these or of YOLO's text files.
+        results of COCO (.json), or a folder of these.
     output : path-like, optional
         Folder of ``scores.parquet`` (heads), ``street_scores.parquet`` and ``scores.html``; left out, FOLDER/scores.
 
@@ -86,6 +86,7 @@ def _score_readers(output: Output, predictions: Sequence[Path], to: Path) -> tup
     of_streets = [path for path in predictions if is_of_streets(path)]
     lines, sections = list[str](), list[Section]()
     if of_streets:
+        require_pycocotools()
         vision_with_streets(output)
         tables["streets"] = _score_streets(output, of_streets)
         lines += street_lines(tables["streets"])
@@ -113,8 +114,7 @@ _LIMITS = {
     "streets": (
         "Lenses stand in the street's order; images of the test, of lamps that training does not show. Means over the seeds, each scored apart.",
         "95 % intervals are from draws of the scenes of each light level, the same for all designs: for these lamps and this detector as it was trained.",
-        "A box is found that overlaps one of its state by 0.5 (AP50) or by 0.5 to 0.95 (AP). A false box counts at the distance whose boxes are "
-        "nearest in size, and at all intensities.",
+        "Average precision is that of pycocotools. A distance is a range of areas: boxes count where their size is nearest.",
     ),
     "images": ("Lamps that training does not show. 95 % intervals are Student's t over the seeds.",),
 }
@@ -140,18 +140,20 @@ def _of_streets(run: Run, scores: pd.DataFrame) -> Iterator[Section]:
         names = [str(name) for name in totals.index]
         hero = run.hero if run.hero in names[1:] else str(totals["ap50"].idxmax())
         at = rows[(rows["state"] == lens) & (rows["distance_m"] != ALL)]
-        title = f"{reader!s}: {lens} {kind!s}s found"
-        panel = _over_distance(title, at.assign(share=at["found"]), hero)
+        title = f"{reader!s}: average precision of {lens} {kind!s}s"
+        panel = _over_distance(title, at.assign(share=at["ap50"]), hero)
         columns = _columns(
             totals,
-            {"found": "found", "ap50": "AP50", "ap": "AP", "ap50_apart": f"AP50 less that of {names[0]}"},
+            {"ap50": "AP50", "ap50_apart": f"AP50 less that of {names[0]}"},
             "more",
         )
+        for key, label in (("ap", "AP"), ("recall", "AR")):
+            columns[key] = Column(label, "", "more"), dict(zip(names, totals[key].tolist(), strict=True))
         columns["targets"] = (
             Column("targets"),
             {name: f"{int(count):,}" for name, count in zip(names, totals["targets"], strict=True)},
         )
-        note = f"Found: mean over {FALSE_PER_IMAGE[0]:g} to {FALSE_PER_IMAGE[1]:g} false boxes an image, all light levels. {STREETS} has all parts."
+        note = f"AP50: overlaps of 0.5; AP, AR: mean over 0.5 to 0.95. {STREETS} has all parts."
         yield Section(f"{reader!s}: {kind!s}s", Table.of(columns, reference=names[0], hero=hero), (panel,), note)
 
 

@@ -1,4 +1,4 @@
-"""Files of detections in streets: COCO results, and folders of YOLO."""
+"""Files of detections in streets: results of COCO, or a folder of them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import pandas as pd
 
 from ..base.disk import read_input
 from ..base.errors import DataError, ValidationIssue, nearest
-from ..spectra.read_text import number_of
 from ..vision.boxes import Category
 
 _BOX = ("left", "top", "width", "height")
@@ -20,8 +19,6 @@ _MOST = 1e9
 """Of numbers in boxes and scores."""
 _BEYOND, _MANY_BEYOND = 1.05, 0.1
 """How far beyond an image a box ends, relative to it, and of which share of them it is refused."""
-_FIELDS = 6
-"""Of a line of YOLO: class, center and size as shares of the image, confidence."""
 Shape = tuple[int, int]
 
 
@@ -50,59 +47,21 @@ def read_detections(
 def _of_folder(
     path: Path, labels: pd.DataFrame, categories: Sequence[Category], shape: Callable[[str], Shape]
 ) -> pd.DataFrame:
-    """Read the files of one detector, in folders at any depth: COCO results, or text of YOLO for each image."""
-    results, texts = sorted(path.rglob("*.json")), sorted(path.rglob("*.txt"))
-    if results and texts:
-        raise DataError(ValidationIssue("results of COCO beside text of YOLO", str(path), allowed="one of them"))
-    of_image: dict[str, Path] = {}
-    if results:
-        parts = []
-        for file in results:
-            parts.append(_of_coco(file, labels, categories, shape))
-            for name in parts[-1]["image_id"].unique():
-                _once(of_image, name, file)
-        return pd.concat(parts, ignore_index=True)
-    if not texts:
-        raise DataError(ValidationIssue("no detections", str(path), allowed="*.json of COCO, or *.txt of YOLO"))
-    rows, cfas = list[tuple[Any, ...]](), dict(zip(labels["image_id"], labels["cfa"], strict=True))
-    for file in texts:
-        if file.stem not in cfas:
-            raise DataError(_of_other_image(file, None, file.stem, labels))
-        _once(of_image, file.stem, file)
-        high, wide = shape(cfas[file.stem])
-        for at, line in enumerate(_text(file).splitlines(), 1):
-            fields = line.split()
-            if fields:
-                number, x, y, width, height, score = _of_yolo(file, at, fields, len(categories))
-                box = (x - width / 2) * wide, (y - height / 2) * high, width * wide, height * high
-                rows.append((file.stem, *categories[number], *box, score))
-    return _frame(rows)
+    """Read the results of one detector, in folders at any depth."""
+    of_image, parts = dict[str, Path](), list[pd.DataFrame]()
+    for file in sorted(path.rglob("*.json")):
+        parts.append(_of_coco(file, labels, categories, shape))
+        for name in parts[-1]["image_id"].unique():
+            _once(of_image, name, file)
+    if not parts:
+        raise DataError(ValidationIssue("no detections", str(path), allowed="*.json, results of COCO"))
+    return pd.concat(parts, ignore_index=True)
 
 
 def _once(of_image: dict[str, Path], name: str, file: Path) -> None:
     """Refuse an image in two files, such as those of two runs of a detector."""
     if (other := of_image.setdefault(name, file)) != file:
         raise DataError(ValidationIssue(f"an image stands in {other}, too", str(file), value=name))
-
-
-def _of_yolo(
-    file: Path, line: int, fields: Sequence[str], n_categories: int
-) -> tuple[int, float, float, float, float, float]:
-    """Return class, center, size and confidence of a line."""
-    if len(fields) != _FIELDS:
-        allowed = "class, center, width, height and confidence (`save_conf=True`)"
-        raise DataError(ValidationIssue(f"a line of {len(fields)} fields", str(file), line, None, None, allowed))
-    numbers = [number_of(field) for field in fields]
-    if None in numbers:
-        raise DataError(ValidationIssue("no number", str(file), line, None, " ".join(fields)))
-    number, *shares = (float(number or 0) for number in numbers)
-    if number not in range(n_categories):
-        raise DataError(ValidationIssue("no class", str(file), line, None, fields[0], f"0 to {n_categories - 1}"))
-    if not all(0 <= share <= 1 for share in shares):
-        problem, allowed = "no box", "shares of the width and height of the image, and a confidence, from 0 to 1"
-        raise DataError(ValidationIssue(problem, str(file), line, None, " ".join(fields[1:]), allowed))
-    x, y, width, height, score = shares
-    return int(number), x, y, width, height, score
 
 
 def _of_coco(

@@ -22,9 +22,8 @@ from ..base.types import Array, Float
 from ..results.output import Output
 from ..results.tables import VISION
 from ..vision.batches import image_id
-from ..vision.detections import ALL
 from ..vision.lamps import TEST
-from ..vision.scenes import PROTOTYPES, SHUFFLED, UNSEEN, states_of
+from ..vision.scenes import ALL, PROTOTYPES, SHUFFLED, UNSEEN, states_of
 from ..vision.scores import Interval, interval_of_seeds
 from ..vision.section import Vision
 

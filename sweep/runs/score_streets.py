@@ -1,25 +1,44 @@
-"""Scores of a detector's answers to the street images of a benchmark: average precision, what is found, differences."""
+"""Scores of a detector's boxes in the street images of a benchmark, by pycocotools: average precision and recall.
+
+A distance is a range of areas, of boxes whose size is nearest to those there; a light level is its images, a state its
+category. Intervals are from draws of the scenes of each light level, the same for all designs.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import redirect_stdout
+from importlib.util import find_spec
+from io import StringIO
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from ..base.errors import DataError, SweepError, ValidationIssue
+from ..base.types import Array, Float, FloatArray, IndexArray, Int
 from ..results.output import Output
 from ..results.tables import VISION
 from ..vision.boxes import HEAD, targets_of
-from ..vision.detections import ALL, Judge, Subset, draws_of, judge_of, scores_of_draws
 from ..vision.lamps import TEST
-from ..vision.scenes import states_of
+from ..vision.scenes import ALL, states_of
+from ..vision.scores import CONFIDENCE, Interval
 from ..vision.section import Vision
 from ..vision.street import draw_streets, street_labels, street_shape
 
-_KEY_OF_DRAWS = 40
+_KEY_OF_DRAWS, _DRAWS = 40, 100
+_BOX = ["left", "top", "width", "height"]
+_EVERYTHING = (0.0, 1e10)
+STATISTICS = ("ap50", "ap", "recall")
+
+
+class Subset(NamedTuple):
+    """Which targets count; `ALL` for any."""
+
+    state: str = ALL
+    distance_m: float | str = ALL
+    level: str = ALL
 
 
 def labels_of_test(output: Output) -> pd.DataFrame:
@@ -52,33 +71,171 @@ def shape_of(output: Output, cfa: str) -> tuple[int, int]:
     return street_shape(vision_with_streets(output), output.mosaic(cfa).indices.shape)
 
 
+class Judge:
+    """Targets and answers of one design, seed and kind of box, matched by pycocotools."""
+
+    def __init__(
+        self, targets: pd.DataFrame, found: pd.DataFrame, states: Sequence[str], n_images: int, *, strict: bool = True
+    ) -> None:
+        """Match; `targets`: of `targets_of`; `found`: `image`, `state`, box, `score`; not `strict`: by 0.5 alone."""
+        from pycocotools.coco import COCO  # noqa: PLC0415  (an extra, which scores of boxes need)
+        from pycocotools.cocoeval import COCOeval  # noqa: PLC0415
+
+        numbers = {state: number for number, state in enumerate(states, 1)}
+        with redirect_stdout(StringIO()):
+            truth = COCO()
+            truth.dataset = {
+                "images": [{"id": number} for number in range(n_images)],
+                "categories": [{"id": number, "name": state} for state, number in numbers.items()],
+                "annotations": [
+                    one | {"id": at, "iscrowd": 0, "area": one["bbox"][2] * one["bbox"][3]}
+                    for at, one in enumerate(_boxes(targets, numbers), 1)
+                ],
+            }
+            truth.createIndex()
+            scores = found["score"].tolist()
+            said = [one | {"score": score} for one, score in zip(_boxes(found, numbers), scores, strict=True)]
+            self._of = COCOeval(truth, truth.loadRes(said) if said else COCO(), "bbox")
+            self.distances_m, ranges = _ranges(targets)
+            self._of.params.areaRng = [_EVERYTHING, *ranges]
+            self._of.params.areaRngLbl = [str(at) for at in range(len(ranges) + 1)]
+            self._of.params.maxDets = [100]
+            if not strict:
+                self._of.params.iouThrs = np.array([0.5])
+            self._of.evaluate()
+        shape = len(states), 1 + len(ranges), n_images
+        self._cells = np.empty(shape, dtype=object)
+        self._cells.ravel()[:] = self._of.evalImgs
+
+    def means(self, images: Int[IndexArray, " images"]) -> tuple[Float[Array, "thresholds states sizes"], FloatArray]:
+        """Return average precision and largest recall over some images, which may be there several times."""
+        self._of.evalImgs = self._cells[:, :, images].ravel().tolist()
+        self._of.params.imgIds = self._of._paramsEval.imgIds = list(range(images.size))
+        with redirect_stdout(StringIO()):
+            self._of.accumulate()
+        precision, recall = (np.array(self._of.eval[name][..., 0]) for name in ("precision", "recall"))
+        return np.where(precision < 0, np.nan, precision).mean(axis=1), np.where(recall < 0, np.nan, recall)
+
+
+def _boxes(table: pd.DataFrame, numbers: Mapping[str, int]) -> list[dict[str, Any]]:
+    columns = table["image"].tolist(), table["state"].tolist(), table[_BOX].astype(float).to_numpy().tolist()
+    return [
+        {"image_id": int(image), "category_id": numbers[state], "bbox": box}
+        for image, state, box in zip(*columns, strict=True)
+    ]
+
+
+def _ranges(targets: pd.DataFrame) -> tuple[list[float], list[tuple[float, float]]]:
+    """Return distances, and the areas nearer to their median one, in ratio, than to others."""
+    area = (targets["width"] * targets["height"]).groupby(targets["distance_m"]).median().sort_values()
+    ends = np.sqrt(area.to_numpy()[:-1] * area.to_numpy()[1:]).tolist()
+    return area.index.tolist(), [*zip([0.0, *ends], [*ends, _EVERYTHING[1]], strict=True)]
+
+
 def street_scores(output: Output, reader: str, detections: pd.DataFrame, labels: pd.DataFrame) -> pd.DataFrame:
-    """Score a detector: rows for each kind of box, and in it for states, distances, levels and intensities.
+    """Score a detector: rows for each kind of box, and in it for states, distances and light levels.
 
     Designs without a detection are left out; the others are compared with the first of them.
     """
-    vision = vision_with_streets(output)
-    judges: dict[str, dict[str, list[Judge]]] = {}
-    names = {str(kind): _answered(reader, own, labels) for kind, own in detections.groupby("kind", sort=False)}
-    # All designs show the same scenes: of one seed they are drawn alike.
-    for number, of_seed in labels.groupby("seed"):
-        levels = of_seed.drop_duplicates("image").sort_values("image")["level"].to_numpy()
-        draws = draws_of(levels, (output.study.seed, _KEY_OF_DRAWS, *of_seed["seed"].head(1)))
-        for kind, name in ((kind, name) for kind, own in names.items() for name in own):
-            images = of_seed[of_seed["name"] == name]
-            targets = targets_of(images, kind, shape_of(output, images["cfa"].iloc[0]))
-            own = detections["seed"].eq(number) & detections["name"].eq(name) & detections["kind"].eq(kind)
-            judge = judge_of(_states(vision, kind), targets, detections[own], levels, draws)
-            judges.setdefault(kind, {}).setdefault(name, []).append(judge)
-    tables = []
-    for kind, by_name in judges.items():
-        for of in _subsets(vision, kind):
-            rows = pd.DataFrame(scores_of_draws(by_name, of, names[kind][0]))
+    vision, tables = vision_with_streets(output), list[pd.DataFrame]()
+    for kind, own in detections.groupby("kind", sort=False):
+        names, states = _answered(reader, own, labels), states_of(vision) if kind == HEAD else vision.lenses
+        values: dict[str, list[dict[Subset, FloatArray]]] = {name: [] for name in names}
+        counts = dict[tuple[str, Subset], int]()
+        # All designs show the same scenes: of one seed they are drawn alike.
+        for number, of_seed in labels.groupby("seed"):
+            levels = of_seed.drop_duplicates("image").sort_values("image")["level"].to_numpy()
+            draws = _draws(levels, (output.study.seed, _KEY_OF_DRAWS, int(of_seed["seed"].iloc[0])))
+            for name in names:
+                images = of_seed[of_seed["name"] == name]
+                targets = targets_of(images, str(kind), shape_of(output, images["cfa"].iloc[0]))
+                found = own[own["seed"].eq(number) & own["name"].eq(name)]
+                values[name].append(_of_seed(vision, states, targets, found, levels, draws))
+                for of in values[name][-1]:
+                    counts[name, of] = counts.get((name, of), 0) + _count(targets, of)
+        for of in values[names[0]][0]:
+            by_name = {name: np.nanmean([seed[of] for seed in seeds], axis=0) for name, seeds in values.items()}
             where = {key: f"{value:g}" if isinstance(value, float) else value for key, value in of._asdict().items()}
-            tables.append(rows.assign(reader=reader, kind=kind, **where))
-    first = ["reader", "kind", *Subset._fields]
-    scores = pd.concat(tables, ignore_index=True)
-    return scores[[*first, *(name for name in scores.columns if name not in first)]]
+            rows = [
+                {"reader": reader, "kind": kind, **where, "name": name, "targets": counts[name, of]}
+                | _columns(by_name[name], by_name[names[0]])
+                for name in names
+            ]
+            tables.append(pd.DataFrame(rows))
+    return pd.concat(tables, ignore_index=True)
+
+
+def _of_seed(
+    vision: Vision,
+    states: Sequence[str],
+    targets: pd.DataFrame,
+    found: pd.DataFrame,
+    levels: np.ndarray,
+    draws: Int[IndexArray, "draws images"],
+) -> dict[Subset, Float[Array, "rows statistics"]]:
+    """Return the statistics of each subset: as they are, then for each draw, of which only `ap50` is computed."""
+    matched = Judge(targets, found, states, levels.size), Judge(targets, found, states, levels.size, strict=False)
+    result: dict[Subset, list[FloatArray]] = {of: [] for of in _subsets(vision, states)}
+    for at, images in enumerate([np.arange(levels.size), *draws]):
+        judge = matched[at > 0]
+        of_levels = {level: images[levels[images] == level] for level in dict.fromkeys(levels.tolist())}
+        of_images = {level: judge.means(some) for level, some in {ALL: images, **of_levels}.items()}
+        for of, values in result.items():
+            values.append(_statistics(judge, of, states, *of_images[of.level]))
+    return {of: np.stack(values) for of, values in result.items()}
+
+
+def _statistics(
+    judge: Judge, of: Subset, states: Sequence[str], precision: FloatArray, recall: FloatArray
+) -> Float[Array, " statistics"]:
+    """Return `ap50`, `ap` and `recall` of a subset, means over the states that have targets."""
+    size = 0 if of.distance_m == ALL else 1 + judge.distances_m.index(float(of.distance_m))
+    which = slice(None) if of.state == ALL else [list(states).index(of.state)]
+    parts = precision[0, which, size], precision[:, which, size].mean(axis=0), recall[:, which, size].mean(axis=0)
+    return np.array([part[np.isfinite(part)].mean() if np.isfinite(part).any() else np.nan for part in parts])
+
+
+def _subsets(vision: Vision, states: Sequence[str]) -> Iterator[Subset]:
+    """Yield what is told: all, and each state, distance and level, and each state at each distance."""
+    yield Subset()
+    yield from (Subset(state=state) for state in states)
+    yield from (Subset(distance_m=distance) for distance in vision.distances_m)
+    yield from (Subset(level=level) for level in vision.levels)
+    yield from (Subset(state=state, distance_m=distance) for state, distance in product(states, vision.distances_m))
+
+
+def _count(targets: pd.DataFrame, of: Subset) -> int:
+    here = [targets[name].eq(value) for name, value in of._asdict().items() if value != ALL]
+    return int(np.logical_and.reduce(here).sum()) if here else len(targets)
+
+
+def _draws(levels: np.ndarray, seed: tuple[int, ...]) -> Int[IndexArray, "draws images"]:
+    """Return images as drawn with replacement among those of their light level."""
+    rng = np.random.default_rng(seed)
+    groups = [np.flatnonzero(levels == level) for level in dict.fromkeys(levels.tolist())]
+    return np.stack([np.concatenate([rng.choice(group, group.size) for group in groups]) for _ in range(_DRAWS)])
+
+
+def _columns(values: Float[Array, "rows statistics"], first: Float[Array, "rows statistics"]) -> dict[str, float]:
+    """Return statistics and their differences from the first design; those of `ap50` with intervals."""
+    row = dict[str, float]()
+    for at, name in enumerate(STATISTICS):
+        row |= {name: float(values[0, at]), f"{name}_apart": float(values[0, at] - first[0, at])}
+    row |= _interval(values[:, 0]).within(0.0, 1.0).columns(STATISTICS[0])
+    return row | _interval(values[:, 0] - first[:, 0]).columns(f"{STATISTICS[0]}_apart")
+
+
+def _interval(values: Float[Array, " draws"]) -> Interval:
+    """Return a value with the interval that holds 95 % of the draws, mirrored at it.
+
+    Average precision of few scenes is too large, of draws of them twice so (the basic bootstrap: Davison and Hinkley,
+    Bootstrap Methods, 1997, 2.4).
+    """
+    drawn = values[1:][np.isfinite(values[1:])]
+    if not drawn.size:
+        return Interval(float(values[0]), np.nan, np.nan)
+    low, high = np.quantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    return Interval(float(values[0]), float(2 * values[0] - high), float(2 * values[0] - low))
 
 
 def _answered(reader: str, detections: pd.DataFrame, labels: pd.DataFrame) -> list[str]:
@@ -92,19 +249,11 @@ def _answered(reader: str, detections: pd.DataFrame, labels: pd.DataFrame) -> li
     return [str(name) for name in labels["name"].unique() if name in counts]
 
 
-def _states(vision: Vision, kind: str) -> Sequence[str]:
-    return states_of(vision) if kind == HEAD else vision.lenses
-
-
-def _subsets(vision: Vision, kind: str) -> Iterator[Subset]:
-    """Yield what is told: all, and each state, distance, level and intensity, and each state at each distance."""
-    states = _states(vision, kind)
-    yield Subset()
-    yield from (Subset(state=state) for state in states)
-    yield from (Subset(distance_m=distance) for distance in vision.distances_m)
-    yield from (Subset(level=level) for level in vision.levels)
-    yield from (Subset(intensity_cd=candelas) for candelas in vision.intensities_cd)
-    yield from (Subset(state=state, distance_m=distance) for state, distance in product(states, vision.distances_m))
+def require_pycocotools() -> None:
+    """Raise SweepError if pycocotools is not installed."""
+    if find_spec("pycocotools") is None:
+        problem = "scores of boxes need pycocotools, which is not installed"
+        raise SweepError(ValidationIssue(problem, allowed="pip install 'cfa-sweep[vision]'"))
 
 
 def of_all_targets(scores: pd.DataFrame) -> pd.DataFrame:
@@ -119,7 +268,7 @@ def street_lines(scores: pd.DataFrame) -> Iterator[str]:
         first = rows["name"].iloc[0]
         for row in rows.to_dict("records"):
             text = f"{reader}, {kind}s, {row['name']}: average precision {_told(row, 'ap50')}"
-            text += f", over overlaps of 0.5 to 0.95 {_told(row, 'ap')}" if np.isfinite(row["ap"]) else ""
+            text += f", over overlaps of 0.5 to 0.95 {row['ap']:.3f}"
             if row["name"] != first:
                 note = "" if row["ap50_apart_low"] > 0 or row["ap50_apart_high"] < 0 else ", not told apart"
                 text += f"; {_told(row, 'ap50_apart', '+')} against {first}{note}"

@@ -14,6 +14,8 @@ from .lamps import Lamps
 from .section import Vision
 
 OFF = "off"
+ALL = "all"
+"""In place of a state, light level or distance: all of them."""
 FIXED, SHUFFLED = "fixed", "shuffled"
 ORDERS = (FIXED, SHUFFLED)
 """Order of the lenses: as in the street, so that the place of the lit one says its color, or any."""

@@ -206,14 +206,7 @@ LAMPS = ["red lamp", "yellow lamp", "green lamp"]
 
 
 def test_perfect_boxes_come_back(run: Path, pictures: Path, tmp_path: Path) -> None:
-    """With numbers, stems and file names of COCO, and as text of YOLO: all score 1."""
-    yolo = tmp_path / "exported"
-    code, _, err = commanded("export", run, "--images", yolo, "--format", "yolo", "--design", "RYYCy", "--jobs", 1)
-    assert code == 0, err
-    for file in (yolo / "1-RYYCy" / "labels" / "test").glob("*.txt"):
-        with_scores = "".join(f"{line} 0.5\n" for line in file.read_text().splitlines())
-        (tmp_path / "texts" / "RYYCy").mkdir(parents=True, exist_ok=True)
-        (tmp_path / "texts" / "RYYCy" / file.name).write_text(with_scores)
+    """With numbers, stems and file names of COCO: all score 1."""
     for kind in ("numbers", "stems", "names"):
         (tmp_path / kind).mkdir()
         for name in ("0-RGGB", "1-RYYCy"):
@@ -226,12 +219,12 @@ def test_perfect_boxes_come_back(run: Path, pictures: Path, tmp_path: Path) -> N
                 for one in held["annotations"]
             ]
             (tmp_path / kind / f"{name}.json").write_text(json.dumps(rows))
-    readers = [tmp_path / name for name in ("numbers", "stems", "names", "texts")]
+    readers = [tmp_path / name for name in ("numbers", "stems", "names")]
     code, out, err = commanded("score", run, *readers, "--output", tmp_path / "scores")
     assert code == 0, err
-    assert out.count("average precision 1.000") == 14  # heads and lamps, two designs; of YOLO one
+    assert out.count("average precision 1.000") == 12  # heads and lamps, two designs
     table = pd.read_parquet(tmp_path / "scores" / "street_scores.parquet")
-    scores = table[["ap50", "ap", "recall", "found"]].to_numpy()
+    scores = table[["ap50", "ap", "recall"]].to_numpy()
     np.testing.assert_allclose(scores[np.isfinite(scores)], 1.0)
 
 
@@ -250,23 +243,13 @@ ROW = '[{"image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4], "score": 0.5}]'
         ("mine.json", "{}", "no results of COCO"),
         ("mine.json", '[{"image_id": 1, "bb', "no JSON"),
         ("mine.json", "[]", "no detections"),
-        ("mine/0-0-street-test-0.txt", "0 0.5 0.5 0.1 0.1", ":1: a line of 5 fields"),
-        ("mine/0-0-street-test-0.txt", "9 0.5 0.5 0.1 0.1 0.9", ":1: no class"),
-        ("mine/0-0-street-test-0.txt", "0 0.5 x 0.1 0.1 0.9", ":1: no number"),
-        ("mine/0-0-street-test-0.txt", "0 50 50 10 10 0.9", ":1: no box"),
-        ("mine/0-0-street-test-0.txt", "1 0.5 nan 0.1 0.1 0.9", ":1: no number"),
-        ("mine/0-0-street-test-0.txt", "0_5 0.5 0.5 0.1 0.1 0.9", ":1: no number"),
-        ("mine/0-0-street-test-0.txt", "0 0.5 0.5 0.1 0.1 90", ":1: no box"),
         ("mine.json", ROW.replace("1, 2, 3, 4", "100, 20, 900, 400"), "boxes reach beyond their images"),
-        ("mine/classes.txt", "0 0.5 0.5 0.1 0.1 0.9", "not an image"),
     ],
 )
 def test_other_detections_are_refused_with_a_line(run: Path, tmp_path: Path, file: str, text: str, said: str) -> None:
     path = tmp_path / file
-    path.parent.mkdir(exist_ok=True)
     path.write_text(text)
-    given = path.parent if path.suffix == ".txt" else path
-    refused(said, "score", run, given, "--output", tmp_path / "scores")
+    refused(said, "score", run, path, "--output", tmp_path / "scores")
 
 
 def test_strips_are_parts_of_whole_images(monkeypatch: pytest.MonkeyPatch) -> None:

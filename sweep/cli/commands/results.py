@@ -48,8 +48,8 @@ def score(
     predictions: Annotated[
         list[Path],
         typer.Argument(
-            help="CSV or Parquet: image_id, and state or a probability of each; or detections in streets: COCO results "
-            "(.json), or a folder of YOLO's text files.",
+            help="CSV or Parquet: image_id, and state or a probability of each; or detections in streets: "
+            "results of COCO (.json), or a folder of them.",
             show_default=False,
         ),
     ],
