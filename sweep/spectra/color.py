@@ -29,7 +29,6 @@ class ColorRegion:
         return np.asarray((xy[:, :1] * a + xy[:, 1:] * b - c).max(axis=1), dtype=float)
 
 
-_GRAY = 0.5
 _OBSERVER = "cie_1931.csv"
 _EN_12368 = "EN 12368 (traffic control equipment, signal heads), color regions of signal lights"
 REGIONS = {
@@ -94,22 +93,6 @@ def chromaticity(grid: WavelengthGrid, photons: Float[Array, "spectra wavelength
     """
     xyz = tristimulus(grid, photons)
     return np.asarray(xyz[:, :2] / xyz.sum(axis=1, keepdims=True), dtype=float)
-
-
-def display_colors(grid: WavelengthGrid, photons: Float[Array, "spectra wavelengths"]) -> Float[Array, "spectra 3"]:
-    """Return sRGB colors to draw lights with, as bright as their hues allow, 0 to 1.
-
-    Saturated lights are outside sRGB; negative primaries are clipped. Invisible spectra are gray.
-
-    `photons`: photon spectra, photons per nm.
-    """
-    xyz = tristimulus(grid, photons)
-    seen = xyz.max(axis=1) > 0
-    colors = np.full((len(xyz), 3), _GRAY)
-    linear = np.clip(xyz[seen] / xyz[seen].max(axis=1, keepdims=True) @ XYZ_TO_RGB.T, 0, None)
-    linear = linear / linear.max(axis=1, keepdims=True)
-    colors[seen] = srgb_gamma(linear)
-    return colors
 
 
 def srgb_gamma(linear: SameShape) -> SameShape:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
-from sweep.spectra.color import REGIONS, chromaticity, color_matching, display_colors, luminance_per_photon_radiance
+from sweep.spectra.color import REGIONS, chromaticity, color_matching, luminance_per_photon_radiance
 from sweep.spectra.signal_color import EQUAL_ENERGY, VISIBLE, light_color, spectral_locus
 from sweep.spectra.spectrum import WavelengthGrid
 
@@ -27,14 +27,6 @@ def test_the_observer_is_that_of_colour_science_at_every_wavelength() -> None:
     seen = luminance_per_photon_radiance(grid, np.eye(grid.size))[10:-10]
     power_j = 6.62607015e-34 * 299792458 / (efficiency.wavelengths * 1e-9)
     np.testing.assert_allclose(seen, 683.002 * power_j * efficiency.values, rtol=1e-12)
-
-
-def test_display_colors_are_those_of_colour_science() -> None:
-    energy = LIGHTS.photons / GRID.nodes_nm
-    xyz = energy @ color_matching(GRID).T
-    linear = np.clip(colour.XYZ_to_sRGB(xyz / xyz.max(axis=1, keepdims=True), apply_cctf_encoding=False), 0, None)
-    wanted = colour.models.eotf_inverse_sRGB(linear / linear.max(axis=1, keepdims=True))
-    np.testing.assert_allclose(display_colors(GRID, LIGHTS.photons), wanted, atol=1e-12)
 
 
 def test_every_signal_lies_inside_its_color_region() -> None:

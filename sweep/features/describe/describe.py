@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from itertools import chain
@@ -15,15 +14,15 @@ import numpy as np
 from ...base.answer import Answer
 from ...base.disk import read_input
 from ...base.errors import DataError, OutputError, ValidationIssue
+from ...report.panels import Lines, axis_over, png
 from ...results.atomic import write_bytes
 from ...spectra.facts import Curve, Facts, facts_of, merge_equal_issues, notes
 from ...spectra.formats import curves_from, scan_curves
 from ...spectra.signal_color import LightColor
 from ...spectra.spectrum import Quantity
 from ...spectra.units import FITTING, Use, stated_quantity, used_as
-from .picture import draw
 
-_MOST_NAMES = 12
+_MOST_NAMES, _MOST_DRAWN = 12, 16
 _MOST_PICTURE = 100_000_000
 _USES: dict[str, Use] = {"qe": "sensor", "filters": "filter", "surfaces": "surface", "lights": "light"}
 _NAMES = {"qe": "QE of a sensor", "filters": "filters", "surfaces": "surfaces", "lights": "light spectra"}
@@ -100,7 +99,7 @@ def _described(
     picture = folder / f"{path.stem}.png"
     if os.path.lexists(picture) and _SOFTWARE.encode() not in read_input(picture, _MOST_PICTURE, OutputError)[:200]:
         raise OutputError(ValidationIssue("holds something else already", str(picture), allowed="another --output"))
-    write_bytes(_png(path.name, facts, colors), picture)
+    write_bytes(_png(path.name, facts), picture)
     values = {
         "kind": kind,
         "picture": str(picture),
@@ -109,11 +108,20 @@ def _described(
     return [*lines, f"Picture: {picture}"], issues, values
 
 
-def _png(title: str, facts: Facts, colors: Mapping[str, LightColor | None]) -> bytes:
-    buffer = BytesIO()
-    with warnings.catch_warnings(), np.errstate(over="ignore"):
-        warnings.filterwarnings("ignore", "Glyph")  # names in scripts that the font lacks
-        draw(title, facts, colors).savefig(buffer, format="png", dpi=160, metadata={"Software": _SOFTWARE})
+def _png(title: str, facts: Facts) -> bytes:
+    """Return a picture of the curves; of many an even sample."""
+    from PIL import Image, PngImagePlugin  # noqa: PLC0415  (slow to import)
+
+    shown = facts.curves[:: -(-len(facts.curves) // _MOST_DRAWN)]
+    if len(shown) < len(facts.curves):
+        title = f"{title}: {len(shown)} of {len(facts.curves):,} curves"
+    lines = {curve.name: (curve.wavelength_nm, curve.values) for curve in shown}
+    across, up = (np.concatenate([line[at] for line in lines.values()]) for at in (0, 1))
+    x = axis_over("wavelength", "nm", across, zero=False, log=False)
+    panel = Lines(f"{title}: value in the file", x, axis_over("value in the file", "", up, log=False), lines=lines)
+    buffer, told = BytesIO(), PngImagePlugin.PngInfo()
+    told.add_text("Software", _SOFTWARE)
+    Image.open(BytesIO(png([panel]))).save(buffer, format="png", pnginfo=told)
     return buffer.getvalue()
 
 

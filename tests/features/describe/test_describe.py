@@ -10,8 +10,6 @@ import pytest
 
 from sweep.base.errors import OutputError, SweepError
 from sweep.features.describe.describe import describe
-from sweep.features.describe.picture import draw
-from sweep.spectra.facts import Curve, Facts
 from sweep.spectra.signal_color import VISIBLE, light_color, outline
 
 from ...commanded import commanded
@@ -85,12 +83,3 @@ def test_a_pipe_is_no_picture(tmp_path: Path) -> None:
     good = csv(tmp_path, "wavelength_nm,R", WAVE, bell(550, 30), name="a.csv")
     with pytest.raises(SweepError, match="not a file"), within(120.0):
         describe(good, output=tmp_path)
-
-
-def test_a_picture_of_many_samples_keeps_their_extremes() -> None:
-    wave, values = np.linspace(400, 700, 100_003), np.random.default_rng(3).random(100_003)
-    values[77_777] = 9
-    figure = draw("many", Facts((Curve("a", wave, values),)), {})
-    (drawn,) = (line.get_ydata() for line in figure.axes[0].lines if len(line.get_ydata()) > 100)
-    assert len(drawn) < 10_000
-    assert drawn.max() == 9
