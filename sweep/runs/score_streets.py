@@ -154,7 +154,7 @@ def street_scores(output: Output, reader: str, detections: pd.DataFrame, labels:
                 for of in values[name][-1]:
                     counts[name, of] = counts.get((name, of), 0) + _count(targets, of)
         for of in values[names[0]][0]:
-            by_name = {name: np.nanmean([seed[of] for seed in seeds], axis=0) for name, seeds in values.items()}
+            by_name = {name: _mean([seed[of] for seed in seeds]) for name, seeds in values.items()}
             where = {key: f"{value:g}" if isinstance(value, float) else value for key, value in of._asdict().items()}
             rows = [
                 {"reader": reader, "kind": kind, **where, "name": name, "targets": counts[name, of]}
@@ -192,7 +192,15 @@ def _statistics(
     size = 0 if of.distance_m == ALL else 1 + judge.distances_m.index(float(of.distance_m))
     which = slice(None) if of.state == ALL else [list(states).index(of.state)]
     parts = precision[0, which, size], precision[:, which, size].mean(axis=0), recall[:, which, size].mean(axis=0)
-    return np.array([part[np.isfinite(part)].mean() if np.isfinite(part).any() else np.nan for part in parts])
+    return np.array([_mean(part.tolist()) for part in parts])
+
+
+def _mean(parts: Sequence[Any]) -> FloatArray:
+    """Return the mean of what is known; NaN of nothing."""
+    values = np.array(parts, dtype=float)
+    known = np.isfinite(values)
+    total, count = np.where(known, values, 0.0).sum(axis=0), known.sum(axis=0)
+    return np.asarray(np.divide(total, count, out=np.full(np.shape(total), np.nan), where=count > 0))
 
 
 def _subsets(vision: Vision, states: Sequence[str]) -> Iterator[Subset]:
