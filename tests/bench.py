@@ -78,7 +78,7 @@ def distances(imager: SceneModel, block: Any) -> None:
     changing = imager.along(block)
     assert changing is not None
     members = imager.setup.members
-    separations_along(changing.fixed[0], changing.channel, changing.make(slice(None))[:, 0], members)
+    separations_along(changing.of.fixed[0], changing.of.channel, changing.make(slice(None))[:, 0], members)
 
 
 def rate_of(route: str, study: Study, seconds: float) -> float:
@@ -151,11 +151,11 @@ def kernels(study: Study, found: dict[str, Any]) -> None:
         found[f"{route}_bytes_over_machine_copy"] = moved / found["copy_gbytes_per_s"]
     changing = imager.along(edges)
     assert changing is not None
-    fixed, values = changing.fixed[0], changing.make(slice(None))[:, 0]
+    fixed, values = changing.of.fixed[0], changing.make(slice(None))[:, 0]
     response = np.repeat(fixed[None], BLOCK, axis=0)
-    response[..., changing.channel] = values
+    response[..., changing.of.channel] = values
     arrays = median_s(lambda: [separation(response, members[a], members[b]) for a, b in class_pairs(list(members))])
-    compiled = median_s(lambda: separations_along(fixed, changing.channel, values, members))
+    compiled = median_s(lambda: separations_along(fixed, changing.of.channel, values, members))
     found["compiled_pairs_over_numpy_pairs"] = arrays / compiled
     found["separable_over_dense"] = found["separable_designs_per_s"] / found["dense_designs_per_s"]
 

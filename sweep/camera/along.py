@@ -30,7 +30,7 @@ class Along:
     def __init__(
         self, views: Sequence[View], exposure: Exposure, readout: Readout, white: PerWavelength, fixed_white: float
     ) -> None:
-        self.setup, self.views, self.readout = views[0].setup, views, readout
+        self.setup, self.readout = views[0].setup, readout
         (self.channel,), nothing = self.setup.camera.modified, np.zeros((1, *self.setup.camera.base_qe.shape))
         images = [view.image for view in views if isinstance(view.image, Channels)]
         own, sizes = slice(self.channel, None, images[0].n_channels), [image.n_cases for image in images]

@@ -59,7 +59,7 @@ class Axis:
 class Search:
     """The smallest of several values of several designs along an axis.
 
-    `at` gives values; `known` are those at the places of the axis, if they are; `flat`: a start whose neighbors all
+    `at` gives values; `known` are those at the places of the axis; `flat`: a start whose neighbors all
     differ from it by less is refined no further.
     """
 

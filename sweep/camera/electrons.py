@@ -44,7 +44,7 @@ class View:
 
     def background(self, qe: DesignCurves, channels: Sequence[int], exposure: Exposure) -> Dark:
         """Return electrons/s of the background behind some filters alone."""
-        if self.position.dark:
+        if not self.position.has_background:
             return np.zeros((self.image.channel.size, len(qe)))
         rates = self.position.of_background(exposure.seen(qe, channels), channels)
         return self.image.uniform(rates, channels, exposure.crosstalk)

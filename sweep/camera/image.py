@@ -233,3 +233,11 @@ class Channels:
 
 
 Image = Pixels | Channels
+
+
+def in_cases(
+    folded: Float[Array, "places channels rows moments signals"],
+) -> Float[Array, "rows cases signals channels"]:
+    """Return folded values of designs, or of a design and its derivatives, case by case."""
+    ordered = np.transpose(folded, (2, 0, 3, 4, 1))
+    return np.ascontiguousarray(ordered.reshape(len(ordered), -1, *ordered.shape[3:]))

@@ -29,10 +29,6 @@ class Steady:
         """Return the light of each exposure."""
         return np.ones((self.n_exposures, exposure_s.size, 1))
 
-    def axis(self, exposure_s: float) -> Axis:  # noqa: ARG002
-        """Return the only moment."""
-        return Axis.along(np.zeros(1), 0)
-
 
 @dataclass(frozen=True)
 class Pulsed:

@@ -15,6 +15,7 @@ from ..base.types import Array, ChannelCurves, CurvesGradient, DesignCases, Desi
 from .brightness import LampReadings, LampSlopes, room_dn
 from .electrons import View
 from .exposure import relative_slope
+from .image import in_cases
 from .model import SceneModel
 from .noise.law import STEPS_DN2, groups_of, pixel_law
 from .pixel import unquantized
@@ -69,7 +70,7 @@ class LinearModel:
         parts = []
         for view in self.scene.own_views:
             electrons = self._electrons(view, curves, curves_gradient, lamps_only=lamps_only)
-            parts.append(_of_cases(view.image.folded(electrons)))
+            parts.append(in_cases(view.image.folded(electrons)))
         values = np.concatenate(parts, axis=1) * self.pixel.dn_per_e
         return values[0] + (0.0 if lamps_only else self.pixel.offset_dn), values[1:]
 
@@ -85,8 +86,8 @@ class LinearModel:
             electrons = self._electrons(view, curves, curves_gradient)
             by_u, moments = electrons[:, 1:], self._moments(view, electrons[:, 0])
             mean, variance, mean_per_e, variance_per_e = (of[:, None] for of in moments)
-            means.append(_of_cases(view.image.folded(np.concatenate([mean, mean_per_e * by_u], axis=1))))
-            variances.append(_of_cases(view.image.spread(np.concatenate([variance, variance_per_e * by_u], axis=1))))
+            means.append(in_cases(view.image.folded(np.concatenate([mean, mean_per_e * by_u], axis=1))))
+            variances.append(in_cases(view.image.spread(np.concatenate([variance, variance_per_e * by_u], axis=1))))
         mean, variance = (np.concatenate(parts, axis=1) for parts in (means, variances))
         return mean[0], variance[0], mean[1:], variance[1:]
 
@@ -148,7 +149,7 @@ class LinearModel:
         none, parts = np.empty((0, *curves.shape[1:])), []
         for view in self._by_pixel:
             of_designs = [view.image.spread(self._electrons(view, design, none)) for design in curves]
-            parts.append(_of_cases(np.concatenate(of_designs, axis=2)))
+            parts.append(in_cases(np.concatenate(of_designs, axis=2)))
         return np.concatenate(parts, axis=1)
 
     def spread_shares(self) -> Float[Array, "cases channels"]:
@@ -232,14 +233,6 @@ class LinearModel:
         background = uniform[:, None, None] * position.per_qe(position.background, channel)
         total = lit[:, None] * scales[:, None, None, None] + background
         return np.asarray(total.reshape(-1, *total.shape[2:]) * exposure_s[0], dtype=float)
-
-
-def _of_cases(
-    folded: Float[Array, "places channels rows moments signals"],
-) -> Float[Array, "rows cases signals channels"]:
-    """Return values of channels in the order of rows, cases, signals and channels."""
-    ordered = np.transpose(folded, (2, 0, 3, 4, 1))
-    return ordered.reshape(len(ordered), -1, *ordered.shape[3:])
 
 
 @lru_cache(maxsize=16)

@@ -31,7 +31,7 @@ def pixels_per_phase(setup: Setup) -> int:
 def bytes_per_phase(setup: Setup, *, by_pixel: bool) -> int:
     """Estimate the memory of the response at one phase.
 
-    `by_pixel`: single pixels, factored (see `SplitLight`), one field position after the other.
+    `by_pixel`: single pixels, one field position after the other.
     """
     n = len(setup.camera.mosaic.channels)
     if by_pixel:

@@ -23,6 +23,7 @@ from .brightness import LampReadings
 from .electrons import Dark, Lit, View
 from .exposure import exposure_times, fixed_white, white_irradiance
 from .field import field_heights, scene_at
+from .image import in_cases
 from .light import Steady, alike, different, light_of
 from .phases import Phases, different_phases, scene_phases
 from .pixel import unquantized
@@ -129,7 +130,7 @@ class SceneModel:
             channel, parts_of = view.image.channel, list[Float[Array, "places channels designs moments signals"]]()
             for electrons in self._blocks(view, curves, scales[..., first], exposure_s):
                 parts_of.append(view.image.folded(self.readout.mean(electrons, channel)))
-            parts.append(_by_design(parts_of))
+            parts.append(in_cases(np.concatenate(parts_of, axis=2)))
         dn = np.concatenate(parts, axis=1)
         return dn[:, np.arange(dn.shape[1]).reshape(-1, first.size)[:, which].ravel()], exposure_s
 
@@ -145,8 +146,9 @@ class SceneModel:
             for electrons in self._blocks(view, curves, scales, exposure_s):
                 mean, variance = self.readout.moments(electrons, view.image.channel)
                 read.append((view.image.folded(mean), view.image.spread(variance)))
-            means.append(_by_design([mean for mean, _ in read]))
-            variances.append(_by_design([variance for _, variance in read]))
+            mean, variance = (in_cases(np.concatenate(of_blocks, axis=2)) for of_blocks in zip(*read, strict=True))
+            means.append(mean)
+            variances.append(variance)
         return NoisyReadout(np.concatenate(means, axis=1), np.concatenate(variances, axis=1), exposure_s)
 
     def _blocks(
@@ -224,13 +226,6 @@ class SceneModel:
         scales = self.scales(exposure_s)
         parts = [np.concatenate([*self._blocks(view, curves, scales, exposure_s)], axis=2) for view in self.own_views]
         return np.concatenate([np.moveaxis(part, 1, -1) for part in parts], axis=2)
-
-
-def _by_design(blocks: Sequence[Float[Array, "_places channels _designs moments signals"]]) -> DesignCases:
-    """Return digital numbers of blocks of designs in the order of designs, cases, signals and channels."""
-    folded = np.concatenate(blocks, axis=2)
-    ordered = np.transpose(folded, (2, 0, 3, 4, 1))
-    return np.ascontiguousarray(ordered.reshape(len(ordered), -1, *ordered.shape[3:]))
 
 
 @lru_cache(maxsize=8)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.types import Array, Bool, BoolArray, DesignCurves, Float, FloatArray
+from ..base.types import Array, Bool, BoolArray, DesignCurves, Float
 from ..spectra.spectrum import linear_basis
 from . import disc_image, psf, sampling
 from .angular import AngularResponse
@@ -25,8 +26,7 @@ _LATTICE = 17
 class Position:
     """Lamps behind air and lens, and filters in the cone of rays, at one image height.
 
-    `signals`, `background`: electrons/s of each signal on a whole image, and of the background, per unit of QE; `dark`:
-    there is no background.
+    `signals`, `background`: electrons/s of each signal on a whole image, and of the background, per unit of QE.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -35,7 +35,7 @@ class Position:
         self._setup = setup
         self.signals = irradiance.signals * area_bins * path_factor(setup, nodes_nm)
         self.background = irradiance.background * area_bins * path_factor(setup, nodes_nm, background=True)
-        self.dark = not self.background.any()
+        self.has_background = bool(self.background.any())
 
     @cached_property
     def angular(self) -> AngularResponse:
@@ -83,8 +83,7 @@ def chart(setup: Setup, *, by_pixel: bool) -> Image:
     pixels = Pixels.of((np.ones((1, 1)), None), dark, through, dark[0], weight, 1, n)
     if by_pixel:
         return pixels
-    means = Channels.of([pixels], crosstalk)
-    return Channels(means.light, means.background, None, mosaic.counts)
+    return replace(Channels.of([pixels], crosstalk), counts=mosaic.counts)
 
 
 _IMAGES: Cache[Hashable, list[Image]] = Cache(6)
@@ -140,14 +139,11 @@ def _light(
     if not setup.computes("blur"):
         return disc_image.light_on_pixels(window, requested, half, radius_px, None, pixel.pitch_um)
     furthest_px = 2**0.5 * (sampling.reach_px(setup, scene.target) + 2.5)
-    sizes, knots_nm = (radius_px * pixel.pitch_um, furthest_px * pixel.pitch_um), _knots_nm(setup)
+    sizes = radius_px * pixel.pitch_um, furthest_px * pixel.pitch_um
+    knots_nm = psf.psf_knots_nm(nodes_nm, setup.accuracy.psf_step_nm)
     w20_um = psf.defocus_um(scene, pixel.pitch_um)
     profile = psf.profile(*sizes, tuple(knots_nm * 1e-3), scene.optics.f_number, w20_um)
     light = disc_image.light_on_pixels(window, requested, half, radius_px, profile, pixel.pitch_um)
     if light.shares is None or knots_nm.size == nodes_nm.size:
         return light
     return disc_image.PixelLight(light.values, light.place, light.shares @ linear_basis(nodes_nm, knots_nm))
-
-
-def _knots_nm(setup: Setup) -> FloatArray:
-    return psf.psf_knots_nm(setup.camera.grid.nodes_nm, setup.accuracy.psf_step_nm)

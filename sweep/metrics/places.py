@@ -15,6 +15,7 @@ from ..base.errors import SweepError, ValidationIssue
 from ..base.types import Array, Bool, BoolArray, Float, PerDesign, SameShape
 from ..camera.axis import Axis, Search
 from ..camera.electrons import View
+from ..camera.light import Pulsed
 from ..camera.memory import blocks
 from ..camera.model import SceneModel
 from ..camera.phases import axis_of, phases_at
@@ -231,6 +232,7 @@ class _Refinement:
             values = self._read(number, self.model.at(views, moments[:, 0]))
             return np.asarray(values.reshape(1, len(values), -1, len(moments)).min(axis=2))
 
+        assert isinstance(self.model.light, Pulsed)
         axis = self.model.light.axis(self.exposure_s[self.sought.designs[number]])
         least = Search(axis, at, at(axis.places, np.ones((1, len(axis.places)), dtype=bool))).run()[0]
         return self._both_ends(least[0, :, None])[:, 0]

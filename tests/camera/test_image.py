@@ -96,7 +96,7 @@ def test_channels_are_weighted_sums_of_the_light_of_all_pixels(
 
 
 def test_mirrored_pixels_are_one_element() -> None:
-    """A light in the middle of a pixel: an eighth of its pixels differ where all see one filter, and rows have no order."""
+    """A light in the middle of a pixel: of the eight places that mirrors and a transposition make equal, few differ."""
     given = {"target": FAR | {"phase_px": [0.0, 0.0]}, "optics": F2, "noise": True}
     made = scene("one", "RCCC", given, DARK)
     phases = Phases(np.zeros((1, 2)), np.zeros((1, 2)))
