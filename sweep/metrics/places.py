@@ -83,8 +83,8 @@ def refine(
     `cases`: columns in the scene's own cases.
     """
     for start in range(0, len(sought.designs), _TOGETHER):
-        some = replace(sought, designs=sought.designs[start : start + _TOGETHER])
-        _Refinement(model, some, exposure_s, cases, quantities).put(columns)
+        block = replace(sought, designs=sought.designs[start : start + _TOGETHER])
+        _Refinement(model, block, exposure_s, cases, quantities).put(columns)
 
 
 def oriented(quantity: Quantity, values: SameShape) -> SameShape:
@@ -126,8 +126,8 @@ class _Refinement:
                 everywhere = np.ones((len(self.sought.designs), len(axis.places)), dtype=bool)
                 known = self._at_phases(axis.places, everywhere)
             else:
-                own = self._both_ends(self._own().min(axis=(2, 4)))
-                known = own[:, :, phases_at(setup, axis.places)[1]].min(axis=2)
+                values = self._both_ends(self._own().min(axis=(2, 4)))
+                known = values[:, :, phases_at(setup, axis.places)[1]].min(axis=2)
             values, places = self._searched(axis, known, self._at_phases)
             if pulsed:
                 values = self._at_worst_moments(values, places)

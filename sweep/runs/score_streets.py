@@ -88,14 +88,14 @@ class Judge:
                 "images": [{"id": number} for number in range(n_images)],
                 "categories": [{"id": number, "name": state} for state, number in numbers.items()],
                 "annotations": [
-                    one | {"id": at, "iscrowd": 0, "area": one["bbox"][2] * one["bbox"][3]}
-                    for at, one in enumerate(_boxes(targets, numbers), 1)
+                    box | {"id": at, "iscrowd": 0, "area": box["bbox"][2] * box["bbox"][3]}
+                    for at, box in enumerate(_boxes(targets, numbers), 1)
                 ],
             }
             truth.createIndex()
             scores = found["score"].tolist()
-            said = [one | {"score": score} for one, score in zip(_boxes(found, numbers), scores, strict=True)]
-            self._of = COCOeval(truth, truth.loadRes(said) if said else COCO(), "bbox")
+            answers = [box | {"score": score} for box, score in zip(_boxes(found, numbers), scores, strict=True)]
+            self._of = COCOeval(truth, truth.loadRes(answers) if answers else COCO(), "bbox")
             self.distances_m, ranges = _ranges(targets)
             self._of.params.areaRng = [_EVERYTHING, *ranges]
             self._of.params.areaRngLbl = [str(at) for at in range(len(ranges) + 1)]
@@ -138,8 +138,8 @@ def street_scores(output: Output, reader: str, detections: pd.DataFrame, labels:
     Designs without a detection are left out; the others are compared with the first of them.
     """
     vision, tables = vision_with_streets(output), list[pd.DataFrame]()
-    for kind, own in detections.groupby("kind", sort=False):
-        names, states = _answered(reader, own, labels), states_of(vision) if kind == HEAD else vision.lenses
+    for kind, boxes in detections.groupby("kind", sort=False):
+        names, states = _answered(reader, boxes, labels), states_of(vision) if kind == HEAD else vision.lenses
         values: dict[str, list[dict[Subset, FloatArray]]] = {name: [] for name in names}
         counts = dict[tuple[str, Subset], int]()
         # All designs show the same scenes: of one seed they are drawn alike.
@@ -149,7 +149,7 @@ def street_scores(output: Output, reader: str, detections: pd.DataFrame, labels:
             for name in names:
                 images = of_seed[of_seed["name"] == name]
                 targets = targets_of(images, str(kind), shape_of(output, images["cfa"].iloc[0]))
-                found = own[own["seed"].eq(number) & own["name"].eq(name)]
+                found = boxes[boxes["seed"].eq(number) & boxes["name"].eq(name)]
                 values[name].append(_of_seed(vision, states, targets, found, levels, draws))
                 for of in values[name][-1]:
                     counts[name, of] = counts.get((name, of), 0) + _count(targets, of)
