@@ -119,14 +119,14 @@ class HeadCamera:
             time_s,
         )
 
-    def _of_white(self, level: LightLevel) -> Float[Array, " channels"]:
+    def _of_white(self, level: LightLevel) -> Float[Array, " wavelengths"]:
         """Return the photons that arrive from a surface of reflectance 1."""
         grid = self.setup.camera.grid
         ambient = ambient_light(grid, level.light)
         radiance = level.illuminance_lx / math.pi / luminance_per_photon_radiance(grid, ambient[None])[0]
         return np.asarray(ambient * (radiance * irradiance_factor(self.vision.optics)), dtype=float)
 
-    def _around(self, level: LightLevel) -> Float[Array, "backgrounds pixels"]:
+    def _around(self, level: LightLevel) -> Float[Array, "backgrounds wavelengths"]:
         """Return the photons that arrive from each background."""
         grid, white = self.setup.camera.grid, self._of_white(level)
         return np.stack([white * reflectance(grid, background) for background in self.vision.backgrounds])
@@ -166,7 +166,7 @@ class HeadCamera:
 
     def _of_lenses(
         self, maps: HeadMaps, spectra: Float[Array, "spectra wavelengths"]
-    ) -> Float[Array, "wavelengths _ spectra _"]:
+    ) -> Float[Array, "places lenses spectra pixels"]:
         """Return spectra on each lens."""
         places, positions = maps.lenses.shape[:2]
         lens_electrons = self._electrons(maps.knots_nm, maps.lenses.reshape(-1, *maps.lenses.shape[2:]), spectra)
@@ -175,9 +175,9 @@ class HeadCamera:
     def _electrons(
         self,
         knots_nm: PerKnot,
-        light: Float[Array, "cases pixels _signals wavelengths"],
+        light: Float[Array, "cases side side knots"],
         spectra: Float[Array, "spectra wavelengths"],
-    ) -> Float[Array, "cases spectra _"]:
+    ) -> Float[Array, "cases spectra pixels"]:
         """Return electrons/s of images with spectra, through each pixel's filter, with crosstalk."""
         setup = self.setup
         on_knots = linear_basis(setup.camera.grid.nodes_nm, knots_nm)
