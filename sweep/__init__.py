@@ -12,11 +12,11 @@ is `new_study`, `list` is `list_studies`, `open` is `show`; `read_run(...).repor
 Names are loaded at their first use; `__init__.pyi` has their types.
 """
 
-from .features import PUBLIC
+from .features import public
 
 __version__ = "0.3.0"
 
-_LOCATIONS = PUBLIC | {
+_LOCATIONS = public() | {
     "load_study": "api.loading:load_study",
     "make_study": "api.loading:make_study",
     "read_run": "api.loading:read_run",
@@ -27,9 +27,6 @@ _LOCATIONS = PUBLIC | {
     "new_study": "api.new:new_study",
     "run": "api.run:run",
     "status": "runs.status:status",
-    "audit": "runs.audit:audit",
-    "export_images": "api.export_images:export_images",
-    "score": "report.scores:score",
     "show": "api.run:show",
     "evaluate": "api.evaluate:evaluate",
     "sensor": "api.loading:sensor",

@@ -1,6 +1,5 @@
 from .api.check import check, plan
 from .api.evaluate import evaluate
-from .api.export_images import export_images
 from .api.inline_curves import read_curves
 from .api.loading import lights, load_study, make_study, read_run, sensor, studies
 from .api.new import new_study
@@ -13,12 +12,15 @@ from .camera.scene import Scene, Target
 from .designs.families.dual import Dual
 from .designs.families.free_form import FreeForm
 from .designs.families.stopband import MultiStopband, Stopband
+from .features.audit.audit import audit
 from .features.compare.compare import compare
 from .features.describe.describe import describe
 from .features.export.export import export
+from .features.vision.export_images import export_images
+from .features.vision.image_files import images
+from .features.vision.score import scores
+from .features.vision.score_report import score
 from .metrics.quantity import Quantity
-from .report.scores import score
-from .runs.audit import audit
 from .runs.listing import list_studies
 from .runs.status import status
 from .spectra.spectrum import WavelengthGrid
@@ -47,6 +49,7 @@ __all__ = [
     "evaluate",
     "export",
     "export_images",
+    "images",
     "lights",
     "list_studies",
     "load_study",
@@ -57,6 +60,7 @@ __all__ = [
     "read_run",
     "run",
     "score",
+    "scores",
     "sensor",
     "show",
     "status",

@@ -38,11 +38,11 @@ def designs_and_metrics() -> None:
 
     from sweep.camera.noise import errors as confusion
     from sweep.camera.pixel import Pixel
+    from sweep.features.vision.images import HeadCamera
+    from sweep.features.vision.lamps import TEST, split_lamps
+    from sweep.features.vision.scenes import SHUFFLED, draw_scenes
     from sweep.runs import run_study
     from sweep.study import load_study
-    from sweep.vision.images import HeadCamera
-    from sweep.vision.lamps import TEST, split_lamps
-    from sweep.vision.scenes import SHUFFLED, draw_scenes
 
     from .build import STUDY
     from .vision.heads import NO_FILTERS, head_setup, vision

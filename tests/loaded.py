@@ -7,7 +7,6 @@ for name in (
     "matplotlib.backends.backend_svg",
     "scipy.stats",
     "sweep.cli.app",
-    "sweep.runs.audit",
     "sweep.api.run",
     "sweep.report.page",
     "sweep.runs.sweep",

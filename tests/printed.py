@@ -8,11 +8,11 @@ from itertools import product
 from pathlib import Path
 
 from sweep.base.errors import EXIT_CODES
+from sweep.features.vision.isp import isp_of
+from sweep.features.vision.keys import Illuminant
 from sweep.results.dictionary import columns_table, files_table
 from sweep.study import load_study
 from sweep.study.editors import SCHEMA_FILE, schema_text
-from sweep.vision.isp import isp_of
-from sweep.vision.section import Illuminant
 
 from .study_reference import study_reference
 

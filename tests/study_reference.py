@@ -5,13 +5,17 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from types import ModuleType
 from typing import Any
 
+from sweep.base.types import Section
+from sweep.features import parts
 from sweep.study.editors import Json, study_schema
 
 _SCHEMA = study_schema()
 _REF = "#/$defs/"
 _STUDY = "A study"
+_HEAD = ["| key | value | default | meaning |", "| --- | --- | --- | --- |"]
 _COPY = "WithEach"
 """Ends the names of copies that the schema holds for editors alone."""
 _TYPES = {
@@ -24,16 +28,43 @@ _TYPES = {
 
 
 def study_reference() -> list[str]:
-    """Markdown: a table of keys for each section, the study itself first."""
+    """Markdown: a table of keys for each section, the study itself first, then the keys of each feature."""
     sections = {name: s for name, s in _SCHEMA["$defs"].items() if not name.endswith(_COPY) and s.get("properties")}
+    own = {feature: _of_feature(module) for feature, module in parts("section").items() if hasattr(module, "KEYS")}
+    core = [name for name in sections if not any(name in names for _, names in own.values())]
+    of_features = {key for keys, _ in own.values() for at in keys.values() for key in at}
     lines = []
-    for name, section in {_STUDY: _SCHEMA, **sections}.items():
-        lines += ["", f"### {_title(name)}", "", _text(section.get("description", "")), ""]
-        lines += ["| key | value | default | meaning |", "| --- | --- | --- | --- |"]
-        for key, prop in section["properties"].items():
-            needed = key in section.get("required", [])
-            lines.append(_row(key, prop, section, needed=needed))
+    for name, section in {_STUDY: _SCHEMA, **{name: sections[name] for name in core}}.items():
+        lines += _heading(_title(name), section)
+        lines += [_row(key, prop, section) for key, prop in section["properties"].items() if key not in of_features]
+    for feature, (keys, names) in own.items():
+        lines += ["", f"## Keys of the feature {feature}", "", *_HEAD]
+        for at, added in keys.items():
+            section = _SCHEMA if at == "StudySection" else sections[at]
+            lines += [_row(key, section["properties"][key], section) for key in added]
+        for name in names:
+            lines += _heading(_title(name), sections[name])
+            lines += [_row(key, prop, sections[name]) for key, prop in sections[name]["properties"].items()]
     return lines[1:]
+
+
+def _of_feature(module: ModuleType) -> tuple[dict[str, list[str]], list[str]]:
+    """The keys that a feature adds, by section, and the names of its own sections."""
+    schemas = {at: keys.model_json_schema(by_alias=True) for at, keys in module.KEYS.items()}
+    inside = module.__name__.rpartition(".")[0]
+    every = {kind.__name__ for kind in _kinds(Section) if kind.__module__.startswith(f"{inside}.")}
+    names = [name for schema in schemas.values() for name in schema.get("$defs", {}) if name in every]
+    return {at: list(schema["properties"]) for at, schema in schemas.items()}, names
+
+
+def _kinds(of: type) -> Iterator[type]:
+    for kind in of.__subclasses__():
+        yield kind
+        yield from _kinds(kind)
+
+
+def _heading(title: str, section: Json) -> list[str]:
+    return ["", f"### {title}", "", _text(section.get("description", "")), "", *_HEAD]
 
 
 def _title(name: str) -> str:
@@ -45,7 +76,8 @@ def _text(description: str) -> str:
     return " ".join(description.split())
 
 
-def _row(key: str, prop: Json, section: Json, *, needed: bool) -> str:
+def _row(key: str, prop: Json, section: Json) -> str:
+    needed = key in section.get("required", [])
     own = prop.get("description", "")
     meaning = "" if own == section.get("description") else _text(own)
     default = "must be there" if needed else _default(prop)

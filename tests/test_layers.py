@@ -21,7 +21,6 @@ LEVELS = [
     "spectra",
     "designs",
     "camera",
-    "vision",
     "metrics",
     "search",
     "study",
@@ -40,7 +39,7 @@ ONLY_USER = {
     "moocore": ["metrics/pareto"],
     "jinja2": ["report/"],
     "typer": ["cli/", "features/"],
-    "pycocotools": ["runs/score_streets"],
+    "pycocotools": ["features/vision/"],
     "numba": ["base/machine_code", "base/lane_kernels"],
 }
 """The files, or all of a folder, that alone may import a library."""
@@ -74,6 +73,13 @@ def imported(path: Path, root: Path) -> list[tuple[int, str, tuple[str, ...]]]:
     return imports
 
 
+def needs_of(root: Path, feature: str) -> tuple[str, ...]:
+    """The features that a feature says it needs."""
+    said = root / "features" / feature / "__init__.py"
+    named = re.search(r"^NEEDS = (.*)$", said.read_text() if said.is_file() else "", re.MULTILINE)
+    return () if named is None else ast.literal_eval(named[1])
+
+
 def breaches(root: Path) -> list[str]:
     lines = []
     for path in sorted(root.rglob("*.py")):
@@ -89,7 +95,10 @@ def breaches(root: Path) -> list[str]:
                 lines.append(f"{where}:{line} imports {library}, which only {ONLY_USER[library]} may")
             elif target == ("features",):
                 continue  # the list of features, which every level may ask
-            elif target[:1] == ("features",) == (unit,) and target[1] != where.parts[1]:
+            elif target[:1] == ("features",) == (unit,) and target[1] not in (
+                where.parts[1],
+                *needs_of(root, where.parts[1]),
+            ):
                 lines.append(f"{where}:{line} imports the feature {target[1]}")
             elif target and target[0] not in (unit, *lower):
                 lines.append(f"{where}:{line} ({unit}) imports {target[0]}, which is not below it")

@@ -54,7 +54,7 @@ def inputs(batch):
 
 answers = []
 for cfa in ("RGGB", "RCCB"):
-    training, test = (list(run.images(split, [cfa])) for split in ("train", "test"))
+    training, test = (list(sweep.images(run, split, [cfa])) for split in ("train", "test"))
     for seed in range(2):  # each has lamps of its own to learn from
         learned = [(inputs(batch), batch.labels["state"]) for batch in training if batch.labels["seed"].iloc[0] == seed]
         classifier = make_pipeline(StandardScaler(), LogisticRegression(max_iter=300, C=0.01))
@@ -68,7 +68,7 @@ for cfa in ("RGGB", "RCCB"):
 # Its errors on lamps that it has not seen, less those of the ideal observer of the same images, with 95 % intervals:
 
 # %%
-scores = run.score(pd.concat(answers))
+scores = sweep.scores(run, pd.concat(answers))
 whole = scores[(scores["distance_m"] == "all") & (scores["level"] == "all")]
 shown = ["order", "name", "error", "observer_error", "above_observer", "above_observer_low", "above_observer_high"]
 print(whole[shown].round(3).to_string(index=False))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..report import Output
-    from ..vision.batches import Batch, Form
 
 
 class LoadedStudy:
@@ -430,66 +429,6 @@ class FinishedRun:
         from ..report import summary_lines
 
         return "\n".join(summary_lines(self.output))
-
-    def images(self, split: str = "test", designs: Sequence[str] | None = None, form: Form = "raw") -> Iterator[Batch]:
-        """Yield labeled images of the run's benchmark of vision, up to 1,024 at once, without files.
-
-        Parameters
-        ----------
-        split : {'train', 'check', 'test'}
-            Split. The readers of the run have read those of the test.
-        designs : sequence of str, optional
-            Names of designs, such as "RGGB"; all of them by default.
-        form : {'raw', 'demosaicked', 'isp'}
-            Raw mosaics (uint16 DN, float32 of HDR pixels), every channel at every pixel (float32 DN above the black
-            level), or pictures of a plain ISP (uint8 sRGB).
-
-        Yields
-        ------
-        Batch
-            `images`, ndarray of shape (n, rows, columns) or (n, rows, columns, n_channels), and `labels`, a table with
-            the columns of an exported manifest.
-
-        Raises
-        ------
-        SweepError
-            If the run has no images, or no such design, split or form.
-        """
-        from ..runs.image_files import images_of_run
-        from ..runs.score import unseen_images
-        from ..vision.batches import FORMS
-        from ..vision.lamps import SPLITS
-
-        names = list(unseen_images(self.output)["name"].unique())
-        chosen = names if designs is None else list(designs)
-        for value, known in ((split, SPLITS), (form, FORMS), *((name, names) for name in chosen)):
-            if value not in known:
-                allowed, near = ", ".join(known), nearest(value, known)
-                raise SweepError(ValidationIssue("unknown", value=value, allowed=allowed, nearest=near))
-        return images_of_run(self.study.study, self.output.named_rows, split, chosen, form)
-
-    def score(self, predictions: pd.DataFrame) -> pd.DataFrame:
-        """Score a reader's answers to the test images of the run's benchmark of vision.
-
-        Parameters
-        ----------
-        predictions : pandas.DataFrame
-            Columns `image_id`, and `state` (or "unknown") or a probability of each state.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Errors of each design, by order of the lenses, distance and light level, with intervals; differences from
-            the first design and from the ideal observer, paired; calibration.
-
-        Raises
-        ------
-        SweepError
-            If the run has no images, and for other, double or missing images or answers.
-        """
-        from ..runs.score import scores_of_table
-
-        return scores_of_table(self.output, predictions)
 
     def report(self) -> Path:
         """Draw figures and report again.

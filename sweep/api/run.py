@@ -208,9 +208,6 @@ def _run_one(study: Study, how: _How, member: SensorAndLights | None = None) -> 
             how.note(line)
         if not computed:
             how.note(f"{folder} holds this very study, finished; nothing was computed.")
-        from ..runs.audit import audit_again  # noqa: PLC0415  (tables are loaded while workers compute)
-
-        audit_again(folder, how.data)
         parallel = pool if computed and backend == "loky" else in_turn
         answer = _finish(folder, how.began_s, repair=True, parallel=parallel)
     return replace(answer, facts={"computed": bool(computed), **answer.facts})

@@ -125,7 +125,6 @@ def any_filter_search(study: Study, setup: Setup) -> Problem:
         tolerance=study.tolerance,
         states=study.states,
         user_metrics=study.user_metrics,
-        vision=study.images,
     )
 
 

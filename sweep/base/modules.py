@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from inspect import isabstract
 from pkgutil import iter_modules
@@ -17,15 +17,12 @@ def files_in(folder: ModuleType) -> list[ModuleType]:
     return [import_module(f"{folder.__name__}.{file.name}") for file in iter_modules(folder.__path__)]
 
 
-def instances_in(folder: ModuleType, base: Callable[[], T]) -> list[T]:
-    """Instantiate each class derived from `base` that the modules of a package define.
-
-    Returns one instance per class, in the order of the modules.
-    """
+def instances_of(base: Callable[[], T], files: Iterable[ModuleType]) -> list[T]:
+    """Instantiate each class derived from `base` that modules define, in their order."""
     kind_of: Any = base
     return [
         kind()
-        for file in files_in(folder)
+        for file in files
         for kind in vars(file).values()
         if isinstance(kind, type)
         and kind.__module__ == file.__name__

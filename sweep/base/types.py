@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 from jaxtyping import Bool as Bool
@@ -11,8 +11,9 @@ from jaxtyping import Float as Float
 from jaxtyping import Int as Int
 from jaxtyping import Num as Num
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from ..features import modules
 from .errors import StudyError, ValidationIssue
 
 FloatArray = NDArray[np.float64]
@@ -111,6 +112,22 @@ class Section(BaseModel, metaclass=_Told):
         allow_inf_nan=False,
         strict=True,
         defer_build=True,
+    )
+
+    def key(self, name: str) -> Any:
+        """Return the value of a key that a feature adds; None where nothing is stated."""
+        return getattr(self, name, None)
+
+
+_Section = TypeVar("_Section", bound=Section)
+
+
+def with_keys_of_features(section: type[_Section]) -> type[_Section]:
+    """Return a section with the keys that features add to it, whose names they say in `KEYS`."""
+    every = [getattr(module, "KEYS", {}) for module in modules("section")]
+    added = [keys[section.__name__] for keys in every if section.__name__ in keys]
+    return create_model(
+        section.__name__, __base__=(*added, section), __module__=section.__module__, __doc__=section.__doc__
     )
 
 

@@ -35,6 +35,10 @@ _IR_CUT = "IR cut"
 _JITTER = 1e-10
 
 
+UNCLIPPED = "pixels may saturate: random sensors are read before clipping"
+"""Note of a run whose random sensors would clip."""
+
+
 class CurveErrors(Section):
     """Errors of the sensor's curves, each to either side and evenly distributed within.
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 from uuid import uuid4
 from weakref import WeakValueDictionary
 
-from ..base.types import MemberNumbers
+from ..base.types import MemberNumbers, PerWavelength
 from ..spectra.lights import Lights
 from ..spectra.population import stated_yield
-from ..spectra.tasks import StudyTasks
 from .accuracy import STANDARD, Accuracy
 from .camera import Camera
 from .curve_errors import CurveErrors
@@ -22,17 +22,34 @@ READOUT = frozenset({"noise", "quantization", "saturation"})
 """Effects without which digital numbers are linear in electrons."""
 
 
+class Feature:
+    """What a study asks of a feature, which its setups carry; `slow`: a design takes long."""
+
+    slow: ClassVar[bool] = False
+
+    @property
+    def columns(self) -> Hashable:
+        """What its columns depend on."""
+        return True
+
+    @property
+    def curves(self) -> Mapping[tuple[str, str], PerWavelength]:
+        """Curves of files, by owner and name, that a run keeps."""
+        return {}
+
+
 @dataclass(frozen=True, eq=False)
 class Setup:
     """Camera, lights and scene that a batch of designs shares; each is itself alone, and may own a model.
 
+    `features`: what the study asks of features, by their names;
     `left_out`: effects that are not computed (see `effects`).
     """
 
     camera: Camera
     lights: Lights
     scene: Scene
-    tasks: StudyTasks | None = field(default=None, kw_only=True)
+    features: Mapping[str, Feature] = field(default_factory=dict, kw_only=True)
     accuracy: Accuracy = field(default=STANDARD, kw_only=True)
     left_out: frozenset[str] = field(default=frozenset(), kw_only=True)
     user_effects: tuple[UserEffect, ...] = field(default=(), kw_only=True)

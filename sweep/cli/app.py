@@ -47,7 +47,7 @@ def _start(
 for _module in sorted([*files_in(commands), *modules("commands")], key=lambda module: PANELS.index(module.PANEL)):
     for _name, _function in vars(_module).items():
         if isfunction(_function) and _function.__module__ == _module.__name__ and not _name.startswith("_"):
-            app.command(_name.rstrip("_"), rich_help_panel=_module.PANEL)(_function)
+            app.command(_name.rstrip("_").replace("_", "-"), rich_help_panel=_module.PANEL)(_function)
 
 
 @cache

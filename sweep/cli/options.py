@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from enum import StrEnum
 from glob import escape
 from pathlib import Path
 from typing import Annotated
@@ -96,27 +95,3 @@ Quantities = Annotated[
 DataFolder = Annotated[
     Path | None, typer.Option("--data", help="Folder that the study's files are looked for in first.")
 ]
-
-
-class ImageSplit(StrEnum):
-    """Splits of exported images."""
-
-    TRAIN = "train"
-    CHECK = "check"
-    TEST = "test"
-
-
-class ImageFormat(StrEnum):
-    """Formats of exported images."""
-
-    ARRAYS = "arrays"
-    COCO = "coco"
-    YOLO = "yolo"
-
-
-class ImageForm(StrEnum):
-    """Forms of exported images."""
-
-    RAW = "raw"
-    DEMOSAICKED = "demosaicked"
-    ISP = "isp"

@@ -30,7 +30,6 @@ from ..camera.setup import Setup
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
 from ..spectra.lights import Pair, class_pairs
-from ..vision.section import SeededVision
 from .brightness import Walk, curves_of
 from .quantity import Columns
 from .separation import MANY, pixel_roots
@@ -109,7 +108,6 @@ class Batch:
     pairs: Sequence[Pair] = ()
     family: Family | None = None
     points: DesignParameters | None = None
-    images: SeededVision | None = None
     noisy: bool = False
     any_brightness: bool = False
     columns: Columns = field(default_factory=dict)

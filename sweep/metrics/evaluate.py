@@ -15,7 +15,6 @@ from ..camera.setup import Setup
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
 from ..spectra.lights import Pair, class_pairs, pair_name
-from ..vision.section import SeededVision
 from .batch import Batch, DistanceKind
 from .brightness import Walk
 from .columns.chromatic import CHROMATIC_CSD, CHROMATIC_DPRIME, CHROMATIC_ERROR
@@ -24,9 +23,9 @@ from .columns.confusion import D_PRIME, ERROR, STATE_ERROR
 from .columns.exposure import EXPOSURE
 from .columns.pixel_separation import CHROMATIC_PIXEL_CSD
 from .columns.user import UserColumns
-from .metric import Metric, Need
+from .metric import Metric
 from .places import Sought, can_refine, over_cases, refine
-from .quantity import Columns, Quantity, RequestedQuantities
+from .quantity import Columns, Quantity, RequestedQuantities, asked_of
 from .registry import METRICS, quantities_of
 from .separation import csd_name
 from .user_metrics import UserMetric
@@ -50,7 +49,6 @@ def evaluate(
     chromatic: Sequence[Pair] | None = None,
     family: Family | None = None,
     points: DesignParameters | None = None,
-    images: SeededVision | None = None,
     refined: Collection[str] | None = None,
 ) -> Columns:
     """Evaluate a batch of designs as the camera reads them out.
@@ -65,11 +63,11 @@ def evaluate(
     """
     block = _block(designs)
     pairs = class_pairs(model.setup.lights.classes) if chromatic is None else chromatic
-    has = _available(model.setup, states, points, images)
+    has = _available(model.setup, states, points)
     others = [of for of in metrics if of.needs in has and not isinstance(of, ColorSeparation | UserColumns)]
     needs = {of.needs for of in others}
     wanted = "noise" in needs, "any brightness" in needs
-    batch = Batch(model, block, states, tuple(pairs), family, points, images, *wanted)
+    batch = Batch(model, block, states, tuple(pairs), family, points, *wanted)
     of_readings = [_CSD, *others, *map(UserColumns, user_metrics)]
     requested = RequestedQuantities(
         model.setup.lights.classes, tuple(states), any_place=True, user_metrics=tuple(user_metrics)
@@ -150,37 +148,35 @@ def evaluate_some(
     has_sums = few_pixels(model.setup.scene, camera.pixel, camera.mosaic)
     if CHROMATIC_ERROR in metrics and has_sums:  # exact sums may be larger
         metrics.add(ERROR)
-    requested = RequestedQuantities(model.setup.lights.classes, tuple(states), flicker=True)
-    owners = [metric for metric in METRICS if metrics & {of.metric for of in metric.quantities(requested)}]
+    requested = RequestedQuantities(model.setup.lights.classes, tuple(states), features=asked_of(model.setup.features))
+    of_metrics = [of for of in METRICS if metrics & {quantity.metric for quantity in of.quantities(requested)}]
     chromatic = [quantity.pair for quantity in quantities if quantity.metric in CHROMATIC.values() and quantity.pair]
-    columns = evaluate(model, curves, states, metrics=owners, chromatic=chromatic, refined=names)
+    columns = evaluate(model, curves, states, metrics=of_metrics, chromatic=chromatic, refined=names)
     return {quantity.name: float(columns[quantity.name][0]) for quantity in quantities}
 
 
 def designed_quantities(setup: Setup, designs: DesignCurves | Block, metrics: Collection[Metric] = METRICS) -> Columns:
     """Return the quantities of designs without light."""
-    has = _available(setup) - {"readings"}
-    return _of_batch(Batch(SceneModel(setup), _block(designs)), [metric for metric in metrics if metric.needs in has])
+    has = _available(setup)
+    without_light = [metric for metric in metrics if metric.needs in has and not metric.of_scene]
+    return _of_batch(Batch(SceneModel(setup), _block(designs)), without_light)
 
 
 def _available(
     setup: Setup,
     states: Sequence[str] = (),
     points: DesignParameters | None = None,
-    images: SeededVision | None = None,
-) -> set[Need]:
+) -> set[str]:
     """Return what metrics may be computed from."""
-    needs: dict[Need, bool] = {
+    needs = {
         "readings": True,
         "filters": True,
         "noise": bool(states),
         "any brightness": bool(states),
         "pulses": setup.scene.drive is not None and bool(setup.camera.pixel.captures),
-        "tasks": setup.tasks is not None,
         "parameters": points is not None,
-        "images": images is not None,
     }
-    return {need for need, available in needs.items() if available}
+    return {need for need, available in needs.items() if available} | setup.features.keys()
 
 
 def _of_batch(batch: Batch, metrics: Collection[Metric]) -> Columns:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from .batch import Batch, CaseReadings
 from .quantity import Columns, Quantity, RequestedQuantities
 
-Need = Literal["readings", "noise", "any brightness", "pulses", "filters", "tasks", "parameters", "images"]
-
 
 class Metric(ABC):
-    """Columns that are computed together; a class in `metrics/columns/`.
+    """Columns that are computed together; a class in `metrics/columns/`, or in `columns.py` of a feature.
 
     `order` is their place in the table, `needs` what they are computed from. A metric overrides `of_readings` or
     `of_cases`, at each field position, sampling phase and moment, of which the worst counts and is refined, or
@@ -21,7 +19,10 @@ class Metric(ABC):
     """
 
     order: ClassVar[int] = 99
-    needs: ClassVar[Need] = "readings"
+    needs: ClassVar[str] = "readings"
+    """What there must be: "readings", "noise", "any brightness", "pulses", "filters", "parameters", or a feature."""
+    of_scene: ClassVar[bool] = True
+    """False: no effect of a scene changes its columns."""
 
     @abstractmethod
     def quantities(self, requested: RequestedQuantities) -> Sequence[Quantity]:

@@ -11,7 +11,7 @@ from pydantic import Field, GetJsonSchemaHandler, create_model, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from ..base.modules import instances_in
+from ..base.modules import files_in, instances_of
 from ..base.types import PerDesign, Section
 from . import rules
 from .quantity import LOG10, Quantity, RequestedQuantities
@@ -25,7 +25,7 @@ COMBINED = "objective"
 """Column of an objective that is not simply one of the quantities."""
 
 
-RULES: Mapping[str, Rule] = {rule.name: rule for rule in instances_in(rules, Rule)}
+RULES: Mapping[str, Rule] = {rule.name: rule for rule in instances_of(Rule, files_in(rules))}
 """Every rule by its key in a study."""
 _FIELDS: dict[str, Any] = {name: (dict[str, Weight], {}) for name in RULES}
 

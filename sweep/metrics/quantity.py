@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ..base.types import Array, Float, FloatArray, PerChannel
 from ..camera.mosaic import Mosaic
-from ..camera.setup import Setup
+from ..camera.setup import Feature, Setup
 from ..spectra.lights import Pair
-from ..spectra.tasks import TaskColumns
 from .separation import pixel_roots
 from .smooth import Rows, SmoothDesign
 from .user_metrics import UserMetric
@@ -225,8 +224,8 @@ class Quantity(Column):
 class RequestedQuantities:
     """Quantities requested by a study.
 
-    `wanted_yield`: share of random lamps and cameras; 0: none; `vision`: benchmark of vision; `flicker`: pulsed lamps
-    in an HDR pixel; `brightest`: curve whose light is 1, if there is no clear pixel.
+    `wanted_yield`: share of random lamps and cameras; 0: none; `features`: those that are asked for, and what their
+    columns depend on; `brightest`: curve whose light is 1, if there is no clear pixel.
     """
 
     classes: tuple[str, ...]
@@ -235,8 +234,15 @@ class RequestedQuantities:
     edge_shift: bool = False
     population: bool = False
     wanted_yield: float = 0.0
-    tasks: tuple[TaskColumns, ...] = ()
-    vision: bool = False
-    flicker: bool = False
+    features: tuple[tuple[str, Hashable], ...] = ()
     user_metrics: tuple[UserMetric, ...] = ()
     brightest: str = ""
+
+    def asked(self, feature: str) -> Any:
+        """Return what the columns of a feature depend on; None where it is not asked for."""
+        return dict(self.features).get(feature)
+
+
+def asked_of(features: Mapping[str, Feature]) -> tuple[tuple[str, Hashable], ...]:
+    """Return what is asked of features, for `RequestedQuantities`."""
+    return tuple((name, feature.columns) for name, feature in features.items())

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Hashable
 from dataclasses import replace
 from functools import lru_cache
 
-from ..base.modules import instances_in
+from ..base.modules import files_in, instances_of
+from ..features import modules, parts
 from . import columns
 from .metric import Metric
 from .quantity import Quantity, RequestedQuantities
@@ -13,7 +15,9 @@ from .quantity import Quantity, RequestedQuantities
 EDGES = "edges that production shifts"
 POPULATION = "the population of the lights, before clipping and rounding"
 
-METRICS = tuple(sorted(instances_in(columns, Metric), key=lambda metric: metric.order))
+METRICS = tuple(
+    sorted(instances_of(Metric, [*files_in(columns), *modules("columns")]), key=lambda metric: metric.order)
+)
 """All metrics in the order of their columns."""
 
 
@@ -44,3 +48,13 @@ def _worst(quantity: Quantity, requested: RequestedQuantities) -> Quantity | Non
 def quantities_of(requested: RequestedQuantities) -> dict[str, Quantity]:
     """Return the columns of a study by name."""
     return {quantity.name: quantity for quantity in listed(requested)}
+
+
+def owners(names: Collection[str], requested: RequestedQuantities) -> list[Metric]:
+    """Return the metrics that compute some of the columns of a study."""
+    return [of for of in METRICS if not {quantity.name for quantity in of.quantities(requested)}.isdisjoint(names)]
+
+
+def every_feature() -> tuple[tuple[str, Hashable], ...]:
+    """Return all features with what they say for an example, as `RequestedQuantities` takes them."""
+    return tuple((name, module.EXAMPLE) for name, module in parts("columns").items())

@@ -28,7 +28,6 @@ from ..camera.noise.law import STEPS_DN2
 from ..camera.setup import Setup
 from ..designs.family import Family
 from ..spectra.lights import Pair
-from ..vision.section import SeededVision
 from .brightness import BrightnessCurves
 from .complex_step import COMPLEX_STEP, Smooth, moving, root, tail_decades
 from .separation import pixel_roots, separation
@@ -107,10 +106,8 @@ class SmoothDesign:
         span: PerFree,
         members: PopulationModel | None = None,
         drawn: Sample | None = None,
-        images: SeededVision | None = None,
     ) -> None:
         """Compute curves and derivatives."""
-        self.images = images
         self.setup: Setup = model.setup
         self._members, self._drawn = members, drawn
         self.family, self.x = family, x

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..base.types import Array, Float
+from ..features import gathered
 from ..metrics.columns.chromatic import CHROMATIC_ERROR
 from ..metrics.columns.confusion import STATE_ERROR
-from ..metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
 from ..metrics.quantity import DN, WORST_CASE
-from ..results.tables import NAMED, REFERENCE, SWEPT
-from .bands import widest_bands
+from ..results.tables import CROSSINGS, FRONT, NAMED, REFERENCE, SATURATED, SWEPT
 from .numbers import ERROR, SAME, SHARE, Span, amount, change, joined, span
 from .panels import Answer, Curves, Lines, Panel, Points, Section, axis_over, styles_of
 from .run import LIGHT, Run, Series, unit_of, words_of
@@ -28,8 +27,6 @@ _MOST_OTHERS = 3
 """Designs that a sentence names beside the one that answers."""
 _SMALLEST_GAP = 5.0
 """Gaps of a bar that are narrower, in percent of the axis, are left out."""
-_PULSES = {MODULATION: ("brightness", SHARE), FALSE_HUE: ("hue", DN), LAMP_SEEN: ("phases that miss the lamp", SHARE)}
-LIGHTS = {"D65": "daylight", "A": "incandescent", "LED": "white LED", "HPS": "sodium", "LPS": "low-pressure sodium"}
 _COUNTS = (
     "Each channel: equal pixels count once. Every pixel: each of the tile counts, as noise sees it. Any brightness: lamps may be of any. "
     "Light: of all pixels, against a sensor without filters. N: the pixel that is modified. ▲ ▼: better or worse than the first row."
@@ -55,7 +52,6 @@ def trade_off(run: Run) -> Answer:
         "found": run.found, "others": others, "asked": asked and words_of(asked), "price": price(run, table),
         "lost": kept and amount(1 - kept, SHARE), "tiles": run.facts.search is not None and bool(run.facts.search.tiles), "beside": [f"{name} {table.cell(name, 'goal').text}" for name in named] if run.goal.extreme
         else [f"as much as {joined(named)}"] * bool(named),
-        "enough": widest_bands(run.output, {run.reference: of or 0.0}).get(run.reference),
     }  # fmt: skip
     return Answer("trade_off", Section("Designs", table, panels), facts)
 
@@ -101,7 +97,7 @@ def front(run: Run) -> list[Points]:
     if run.hero not in points:
         return []
     lines: dict[str, Any] = {}
-    searched = run.output.front if run.output.goal.name == goal.name else None
+    searched = run.output.tables.get(FRONT) if run.output.goal.name == goal.name else None
     if searched is not None:
         for key, *pair in (("front", "cfa_sensitivity", "objective"), ("bound", "cfa_sensitivity_min", "upper_bound")):
             known = searched[pair].dropna().sort_values(pair[0])
@@ -197,7 +193,9 @@ def errors(run: Run) -> Answer:
     heads = {name: Column(name, group=f"errors of at most {words}, any brightness") for name in names}
     least = {f"least {name}": name for name in (run.hero, run.reference)}
     heads |= {key: run.column(run.goal.name, name, f"least {words_of(run.goal)}") for key, name in least.items()}
-    return Answer("errors_over", Section("By what varies", Table(heads, rows, head="over")), facts, sections)
+    return Answer(
+        "errors_over", Section("By what varies", Table(heads, rows, head="over")), facts, sections, of_all=True
+    )
 
 
 def _without_gaps(one: Series, spans: Sequence[Span]) -> list[Span]:
@@ -211,7 +209,7 @@ def _without_gaps(one: Series, spans: Sequence[Span]) -> list[Span]:
 
 def crossed(run: Run, one: Series, quantity: str, name: str, mask: Any) -> list[Span]:
     """Return ranges in which something holds, by the run's refined crossings where they fit, else by the numbers."""
-    known = run.output.crossings
+    known = run.output.tables.get(CROSSINGS)
     if known is not None:
         own = (known["series"] == one.name) & (known["key"] == one.key)
         of = known[own & (known["quantity"] == quantity) & (known["name"] == name)]
@@ -222,7 +220,7 @@ def crossed(run: Run, one: Series, quantity: str, name: str, mask: Any) -> list[
 
 def full_from(run: Run, one: Series) -> tuple[Column, Mapping[str, float]]:
     """Return the first number of a series at which a lamp fills a pixel of each design, in its last capture."""
-    rows = run.rows.merge(run.output.saturated[["design_id", "full_signals"]], on="design_id")
+    rows = run.rows.merge(run.output.tables[SATURATED][["design_id", "full_signals"]], on="design_id")
     rows = rows[rows["scenario"].isin([*one.scenes]) & (rows["full_signals"] > 0)]
     column = Column("full from", one.axis.unit, "more", "from here on a lamp fills a pixel, even in its last capture")
     first = rows["scenario"].map(one.scenes).astype(float).groupby(rows["name"]).min()
@@ -249,22 +247,17 @@ def series(run: Run, kind: str = "series") -> Answer:
     found = [section for one in run.series if (section := over(run, one, run.over(one, run.goal.name))) is not None]
     if not found:
         return trade_off(run)
-    pulsed = [scene.drive for scene in run.study.scenarios.values() if scene.drive is not None]
-    missed = LAMP_SEEN in run.rows and float(np.nan_to_num(run.rows[LAMP_SEEN].min(), nan=1.0)) < 1
-    dark = amount((1 - pulsed[0].duty) / pulsed[0].frequency_hz, "s") if pulsed and missed else ""
     least, most = (amount(end, run.series[0].axis.unit, trim=True) for end in run.series[0].whole)
     facts = {
-        "dark": dark,
         "over": f"from {least} to {most}",
-        "others": _others(run, found[0].table),
-        "at": _worst_at(run),
+        "others": others_over(run, found[0].table),
     }
-    if len(found) == 1 or kind == "flicker":
+    if len(found) == 1 or kind not in ("series", "least"):
         return Answer(kind, found[0], facts, found[1:])
-    return Answer("several", several(run), facts, found)
+    return Answer("several", several(run), facts, found, of_all=True)
 
 
-def _others(run: Run, table: Table | None) -> list[str]:
+def others_over(run: Run, table: Table | None) -> list[str]:
     """Return where further designs are ahead in a part of the numbers."""
     cells = {} if table is None else {name: table.cell(name, "ahead") for name in table.rows}
     part = {name: cell.text for name, cell in cells.items() if cell.track and not cell.text.startswith("any of")}
@@ -273,14 +266,6 @@ def _others(run: Run, table: Table | None) -> list[str]:
     return (
         [f"{name} {part[name]} ({table.cell(name, 'last').text} {last})" for name in names] if table is not None else []
     )
-
-
-def _worst_at(run: Run) -> str:
-    """Return the number of the first series at which pulses shift the hue most, else the brightness."""
-    one = run.series[0]
-    swings = [run.over(one, name).get(run.hero) for name in (FALSE_HUE, MODULATION)]
-    known = [np.abs(y) for y in swings if y is not None and np.nanmax(np.abs(y)) > 1e-6]
-    return amount(float(one.x[int(np.nanargmax(known[0]))]), one.axis.unit, trim=True) if known else ""
 
 
 def several(run: Run) -> Section:
@@ -332,18 +317,10 @@ def over(run: Run, one: Series, lines: Mapping[str, Line]) -> Section | None:
     lowest = {name: min([float(np.nanmin(y)), *run.worst(one, run.goal.name, name)]) for name, y in lines.items()}
     columns["least"] = replace(run.column(run.goal.name, "least", words_of(run.goal)), promise=True), lowest
     panels: list[Panel] = [*over_numbers(run, one, lines)]
-    for name, (words, unit) in _PULSES.items():
-        known = run.over(one, name)
-        swings = {n: 1 - y if name == LAMP_SEEN else np.abs(y) for n, y in known.items()}
-        if swings and max(float(np.nanmax(y)) for y in swings.values()) > 1e-6:
-            most = {
-                n: max([float(np.nanmax(y)), *(run.worst(one, name, n) if name != LAMP_SEEN else [])])
-                for n, y in swings.items()
-            }
-            columns[words] = Column(words, unit, "less", group="most, by pulses"), most
-            alike = all(np.allclose(y, swings[run.hero], equal_nan=True) for y in swings.values())
-            drawn = {"every CFA": swings[run.hero]} if alike else swings
-            panels += over_numbers(run, one, drawn, f"{words}, by pulses", unit)
+    for more_of in gathered("OVER", "page").values():
+        more, drawn = more_of(run, one)
+        columns |= more
+        panels += drawn
     columns |= {"full": full_from(run, one), "light": run.figure(LIGHT)}
     title = f"Over {one.axis.name}{f', {one.name}' if len(run.series) > 1 and one.name else ''}"
     return Section(title, Table.of(columns, reference=run.reference, hero=run.hero), tuple(panels))
@@ -352,7 +329,7 @@ def over(run: Run, one: Series, lines: Mapping[str, Line]) -> Section | None:
 def _ahead(run: Run, one: Series, name: str, y: Line, of: Line) -> list[Span]:
     """Return where a design has more than the reference, by the run's refined crossings where they fit."""
     y = np.where(np.maximum(y, of) >= (1.0 if run.goal.unit == DN else 0.0), y, -np.inf)
-    known, mask = run.output.crossings, y > of * (1 + SAME)
+    known, mask = run.output.tables.get(CROSSINGS), y > of * (1 + SAME)
     if known is not None and "against" in known:
         pair = [name, run.reference]
         rows = known[(known["series"] == one.name) & (known["key"] == one.key) & (known["quantity"] == run.goal.name)]
@@ -360,25 +337,6 @@ def _ahead(run: Run, one: Series, name: str, y: Line, of: Line) -> list[Span]:
         if len(rows) and len(rows) % 2 == int(mask[0] != mask[-1]):
             return _without_gaps(one, one.spans(mask, np.sort(rows["at"].to_numpy(dtype=float)).tolist()))
     return _without_gaps(one, one.above(y, of * (1 + SAME)))
-
-
-def field(run: Run) -> Answer:
-    """Return the separation from the center of the sensor to its corner."""
-    of, goal = run.output.places, run.goal.of or run.goal.name
-    assert of is not None
-    named = of.assign(name=of["design_id"].map(run.names)).dropna(subset=["name"])
-    table = named.pivot_table(goal, "cra_deg", "name", aggfunc="min", sort=True)
-    one = Series("", "cra_deg", {str(angle): float(angle) for angle in table.index})
-    section = over(run, one, {name: table[name].to_numpy(dtype=float) for name in run.values(LIGHT) if name in table})
-    if section is None:
-        return trade_off(run)
-    lead = replace(section, title="From the center to the corner", panels=(*filters(run), *section.panels))
-    return Answer(
-        "series",
-        lead,
-        {"dark": "", "over": "from the center to the corner", "others": _others(run, lead.table)},
-        [Section("The price", figures(run))],
-    )
 
 
 def worst(run: Run) -> Answer:
@@ -400,7 +358,7 @@ def worst(run: Run) -> Answer:
         "meets": meets(run),
     }
     table = Table.of(with_bound(run, "worst", columns), reference=run.reference, hero=run.hero)
-    panels, traced = [*filters(run)], run.output.front
+    panels, traced = [*filters(run)], run.output.tables.get(FRONT)
     lead = Section("In the worst case", table, (*panels, *_worst_front(run, traced, level)))
     best = max(spans, key=lambda name: spans[name][1])
     costs = f"{change(spans[run.hero][1], spans[best][1])} against {best}" if best != run.hero else ""
@@ -419,91 +377,27 @@ def _worst_front(run: Run, traced: Any, level: float | None) -> list[Lines]:
     return [Lines(f"What it costs in light: {y_axis.label}", across, y_axis, run.hero, lines=known)]
 
 
-def score(run: Run) -> Answer:
-    """Each measure of other tasks, times as good as the reference."""
-    table = measures(run)
-    if not table.rows or run.hero == run.reference:
-        return trade_off(run)
-    factors = {measure: float(row[run.hero]) for measure, row in table.rows.items()}  # type: ignore[arg-type]
-    tasks: dict[str, list[float]] = {}
-    for measure, factor in factors.items():
-        tasks.setdefault(min((measure.partition(f" {words}")[0] for words in _figure_words()), key=len), []).append(
-            factor
-        )
-    order = sorted(tasks, key=lambda task: min(tasks[task]))
-    shown = {task: f"{task} {span(tasks[task])}" for task in order}
-    facts = {
-        "better": sum(factor > 1 + SAME for factor in factors.values()),
-        "worse": sum(factor < 1 - SAME for factor in factors.values()),
-        "of": len(factors),
-        "gains": [shown[task] for task in reversed(order) if min(tasks[task]) > 1 + SAME],
-        "losses": [shown[task] for task in order if min(tasks[task]) < 1 - SAME][:_MOST_OTHERS],
-    }
-    return Answer(
-        "score",
-        Section(f"Other tasks, times as good as {run.reference}", table),
-        facts,
-        [Section("Designs", figures(run))],
-    )
-
-
-def _figure_words() -> list[str]:
-    """Return the names of figures of tasks."""
-    from ..metrics.tasks.figures import FIGURES  # noqa: PLC0415  (few studies have tasks)
-
-    return [figure.words for group in FIGURES.values() for figure in group]
-
-
-def measures(run: Run) -> Table:
-    """Return how many times as good as the reference each design is in each measure of a task."""
-    from ..metrics.tasks.figures import FIGURES  # noqa: PLC0415  (few studies have tasks)
-
-    first = {f"task_{figure.what}" for group in FIGURES.values() for figure in group if figure.first}
-    factors: dict[str, dict[str, float]] = {}
-    styles = styles_of(run.here)
-    designs = sorted((name for name in run.here if name != run.reference), key=lambda name: name != run.hero)
-    for column in run.output.columns.values():
-        values = run.values(column.name)
-        if column.metric not in first or column.extreme or not min(values.values()) > 0:
-            continue
-        if max(values.values()) < 10.0**-column.digits:
-            continue
-        light = next((light for light in LIGHTS if column.words.endswith(f" {light}")), "")
-        words = f"{column.words.removesuffix(f' {light}')}, {LIGHTS[light]}" if light else column.words
-        power = 1 if column.direction == "more" else -1
-        factors[words] = {name: (values[name] / values[run.reference]) ** power for name in designs}
-    every = [factor for row in factors.values() for factor in row.values()]
-    axis = Axis("times as good", "", min([0.5, *every]), max([2.0, *every]), True, 1.0)
-    tracks = {
-        m: Marks((), [(row[name], styles[name].color) for name in reversed(designs)]) for m, row in factors.items()
-    }
-    columns: Columns = {"track": (Column("times as good", axis=axis), tracks)}
-    columns |= {
-        name: (Column(name, "", "more", base=1.0), {m: row[name] for m, row in factors.items()}) for name in designs
-    }
-    return Table.of(columns, hero=run.hero, head="measure")
-
-
-Kind = tuple[Callable[[Run], Any], Callable[[Run], Answer]]
+Kind = tuple[int, Callable[[Run], Any], Callable[[Run], Answer]]
 KINDS: dict[str, Kind] = {
-    "field": (lambda run: run.output.places is not None, field),
     "least": (
+        20,
         lambda run: run.series and run.facts.search is not None and run.facts.search.scenarios > 1,
         lambda run: series(run, "least"),
     ),
-    "errors": (lambda run: run.series and run.study.recognition is not None and CHROMATIC_ERROR in run.rows, errors),
-    "flicker": (
-        lambda run: run.series and run.study.pixel.captures and all(s.drive for s in run.study.scenarios.values()),
-        lambda run: series(run, "flicker"),
+    "errors": (
+        30,
+        lambda run: run.series and run.study.recognition is not None and CHROMATIC_ERROR in run.rows,
+        errors,
     ),
-    "worst": (lambda run: run.goal.extreme == WORST_CASE, worst),
-    "series": (lambda run: run.series and run.facts.search is None, series),
-    "score": (lambda run: run.study.tasks is not None and run.facts.search is None and not run.study.sweeps, score),
-    "trade_off": (lambda _: True, trade_off),
+    "worst": (50, lambda run: run.goal.extreme == WORST_CASE, worst),
+    "series": (60, lambda run: run.series and run.facts.search is None, series),
+    "trade_off": (80, lambda _: True, trade_off),
 }
-"""Kinds of answers: a page has the first that its study calls for."""
+"""Kinds of answers with their ranks: a page has the first that its study calls for."""
 
 
 def answer_of(run: Run) -> Answer:
     """Return the answer of a run."""
-    return next(make(run) for called, make in KINDS.values() if called(run))
+    kinds = sorted((KINDS | gathered("KINDS", "page")).values(), key=lambda kind: kind[0])
+    answer: Answer = next(make(run) for _, called, make in kinds if called(run))
+    return answer

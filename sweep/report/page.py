@@ -10,22 +10,21 @@ from importlib import resources
 from itertools import chain, groupby
 from typing import Any
 
-import pyarrow as pa
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from ..base.types import Parallel, delayed, in_turn
+from ..features import gathered
 from ..results.lock import locked
 from ..results.manifest import Manifest
 from ..results.output import Output
-from ..results.tables import MANIFEST, REPORT, RESULTS, SEARCHED, SWEPT, csv_of, encoded, is_drawn
+from ..results.tables import MANIFEST, REPORT, RESULTS, SEARCHED, SWEPT, is_drawn
 from .answers import answer_of, figures
 from .explorer import explorer_data
 from .numbers import unit_shown
 from .panels import Answer, Panel, Section, png, styles_of, svg
-from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .run import Run, name_of, words_of
-from .sections import SECTIONS, Pairs, conditions, method
+from .sections import Pairs, conditions, method, sections_of
 from .tables import PROVEN, Column, Table
 
 PICTURE = "pareto"
@@ -59,7 +58,7 @@ def filled(facts: Mapping[str, Any]) -> str:
     text = (
         _templates()
         .get_template("answers.j2")
-        .render({"hero": "", "recipe": "", "place": "", "light": "", **facts})
+        .render({"hero": "", "recipe": "", "place": "", "light": "", "dark": "", "at": "", **facts})
         .strip()
     )
     return text if "_" in text.split(maxsplit=1)[0] else text[:1].upper() + text[1:]  # not a name like paper_N4
@@ -70,10 +69,7 @@ def sentence(run: Run, answer: Answer) -> str:
     if run.output.none_feasible:
         return _none_feasible(run)
     table = answer.section.table
-    if table is None or (
-        run.hero not in (*table.rows, *table.columns)
-        and answer.kind not in ("several", "errors_over", "score", "vision")
-    ):
+    if table is None or (run.hero not in (*table.rows, *table.columns) and not answer.of_all):
         return f"{run.hero or 'No design'}: see the tables."
     proven = [
         (name, key)
@@ -90,9 +86,14 @@ def sentence(run: Run, answer: Answer) -> str:
         "strict": _strict(run),
         "bounds": [table.cell(name, key).text for name, key in proven], "place": run.place if searched else "", "light": _light(run),
         "stricter": table.cell(run.hero, _strict(run)).against if _strict(run) in table.columns and against else "",
-        "better": against and against.against, "below": against and against.kind == "loss", **answer.facts,
+        "better": against and against.against, "below": against and against.kind == "loss", **_of_features(run), **answer.facts,
     }  # fmt: skip
-    return filled(facts)
+    clauses = gathered("CLAUSES", "page")
+    return filled(facts) + (clauses[answer.kind](run) if answer.kind in clauses else "")
+
+
+def _of_features(run: Run) -> dict[str, Any]:
+    return {key: value for facts_of in gathered("FACTS", "page").values() for key, value in facts_of(run).items()}
 
 
 def _strict(run: Run) -> str:
@@ -172,14 +173,9 @@ class Report:
 def report_of(output: Output) -> Report:
     """Return the report of a run."""
     run, study = Run(output), output.study
-    if study.vision is not None:
-        from .vision import vision_answer  # noqa: PLC0415  (few studies have images)
-
-        answer = vision_answer(run)
-    else:
-        answer = answer_of(run)
+    answer = answer_of(run)
     sections = {answer.section.title: answer.section}
-    for section in chain(answer.more, chain.from_iterable(of(run) for of in SECTIONS)):
+    for section in chain(answer.more, sections_of(run)):
         sections.setdefault(section.title, section)
     files = [
         RESULTS,
@@ -202,7 +198,7 @@ def report_of(output: Output) -> Report:
 
 
 def make_report(output: Output, *, repair: bool = False, parallel: Parallel = in_turn) -> None:
-    """Write the page, the picture of its first panels, and published figures beside ours; with `repair` only damaged ones.
+    """Write the page, the picture of its first panels, and files of features; with `repair` only damaged ones.
 
     Raises OutputError if a file of others has its name, or the disk refuses.
     """
@@ -215,7 +211,7 @@ def make_report(output: Output, *, repair: bool = False, parallel: Parallel = in
         contents = {
             REPORT: report.html(parallel).encode("utf-8"),
             **pictures_of(report.lead.panels),
-            **_published(output),
+            **{name: of for files in gathered("REPORT_FILES", "page").values() for name, of in files(output).items()},
         }
         manifest.write(contents)
         manifest.remove(name for name in listed if name not in contents)
@@ -224,17 +220,6 @@ def make_report(output: Output, *, repair: bool = False, parallel: Parallel = in
 def pictures_of(panels: Sequence[Panel], name: str = PICTURE) -> dict[str, bytes]:
     """Return the first panels as files for slides."""
     return {} if not panels else {f"{name}.png": png(panels[:2]), f"{name}.svg": svg(panels[-1], name).encode("utf-8")}
-
-
-def _published(output: Output) -> dict[str, bytes]:
-    """Return the files of the comparison with published figures."""
-    table = comparison_with_published(output)
-    if not len(table):
-        return {}
-    return {
-        PUBLISHED_CSV: csv_of(table).encode("utf-8"),
-        PUBLISHED_PARQUET: encoded(pa.Table.from_pandas(table, preserve_index=False)),
-    }
 
 
 def summary_lines(output: Output, took_s: float | None = None) -> list[str]:

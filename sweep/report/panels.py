@@ -458,9 +458,13 @@ class Section:
 
 @dataclass(frozen=True)
 class Answer:
-    """A kind of answer with what its sentence needs beside the table of its section, and further sections."""
+    """A kind of answer with what its sentence needs beside the table of its section, and further sections.
+
+    `of_all`: its sentence needs no row of the design that answers.
+    """
 
     kind: str
     section: Section
     facts: Mapping[str, Any]
     more: Sequence[Section] = ()
+    of_all: bool = False

@@ -13,6 +13,7 @@ import pandas as pd
 
 from ..base.errors import UpperBoundExceededError, ValidationIssue
 from ..base.types import Array, Float
+from ..features import gathered
 from ..metrics.columns.chromatic import CHROMATIC_CSD, CHROMATIC_ERROR
 from ..metrics.columns.color_separation import CSD
 from ..metrics.columns.confusion import STATE_ERROR
@@ -21,7 +22,7 @@ from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import DN
 from ..metrics.quantity import Column as Quantity
 from ..results.output import Output
-from ..results.tables import NAMED, REFERENCE, RGGB, SEARCHED, SWEPT
+from ..results.tables import NAMED, REFERENCE, RGGB, SEARCHED, SWEPT, WORST
 from ..study.axes import series_of
 from .numbers import ERROR, NARROW, SHARE, Span, amount, digits, joined, ranges
 from .tables import PROVEN, Axis, Column, Marks
@@ -54,15 +55,12 @@ COUNTED = {
     CHROMATIC_PIXEL_CSD: "every pixel, any brightness",
 }
 """Ways to count a separation."""
-_INCANDESCENT = "low_light_lux_a"
-_SHORT = {
-    LIGHT: "light",
-    "low_light_lux_led": "lux for SNR 10, white LED",
-    _INCANDESCENT: "lux for SNR 10, incandescent",
-    "color_delta_e_mean_d65": "color error ΔE00, daylight",
-}
-"""What a separation costs, in few words."""
 _LEAST_STEADY = 4.0
+
+
+def _short() -> dict[str, str]:
+    """Return what a separation costs, in few words."""
+    return {LIGHT: "light"} | gathered("PRICES", "page")
 
 
 def name_of(row: Mapping[Any, Any]) -> str:
@@ -80,7 +78,7 @@ def words_of(quantity: Quantity) -> str:
     words = quantity.words.replace("CSD", "separation")
     if words.startswith("chromatic ") and "separation" in words:
         return f"{words.removeprefix('chromatic ')}, any brightness"
-    return _SHORT.get(quantity.name, words)
+    return _short().get(quantity.name, words)
 
 
 @dataclass(frozen=True)
@@ -225,7 +223,7 @@ class Run:
     @property
     def prices(self) -> list[str]:
         """Columns of what a separation costs beside light."""
-        return [name for name in self.figures if name in _SHORT and name != LIGHT]
+        return [name for name in self.figures if name in _short() and name != LIGHT]
 
     @property
     def asked(self) -> str:
@@ -240,9 +238,8 @@ class Run:
         names = [*([self.asked] if self.asked else []), goal.name, *([goal.of] if goal.extreme else [])]
         plain = [column for column in known.values() if not column.extreme]
         names += [c.name for metric in COUNTED for c in plain if c.metric == metric and c.pair == goal.pair and c.pair]
-        names += [
-            name for name in _SHORT if name in known and (name != _INCANDESCENT or name in self.output.constraints)
-        ]
+        limited = gathered("PRICES_IF_LIMITED", "page").keys() - self.output.constraints.keys()
+        names += [name for name in _short() if name in known and name not in limited]
         return list(dict.fromkeys(names))
 
     @cached_property
@@ -334,7 +331,7 @@ class Run:
 
     def worst(self, series: Series, column: str, name: str) -> list[float]:
         """Return the worst values that the run found between the numbers of a series."""
-        known = self.output.worst
+        known = self.output.tables.get(WORST)
         if known is None:
             return []
         own = (known["series"] == series.name) & (known["quantity"] == column) & (known["name"] == name)

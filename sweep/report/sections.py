@@ -11,18 +11,16 @@ import pandas as pd
 from ..base.types import Array, Float
 from ..camera.noise.errors import few_pixels
 from ..camera.scene import Scene
+from ..features import gathered, modules
 from ..results.facts import Origin
 from ..results.manifest import Manifest
 from ..results.tables import COUNTED as OF_TILES
-from ..results.tables import REFERENCE, SWEPT, word_mask
-from ..runs.uncertainty import UNCLIPPED
-from .answers import LIGHTS, filters, measures
-from .bands import widest_bands
+from ..results.tables import POINTS, REFERENCE, SWEPT, TILES, word_mask
+from .answers import filters
 from .numbers import SHARE, amount, digits, inward, joined, span
-from .panels import Curves, Lines, Map, Panel, Points, Section, axis_over
-from .published import comparison_with_published
+from .panels import Curves, Map, Panel, Points, Section, axis_over
 from .run import COUNTED, Run, unit_of, words_of
-from .tables import Axis, Column, Marks, Table
+from .tables import Axis, Column, Table
 
 _PARAMETERS = {
     "left_nm": "left edge", "right_nm": "right edge", "peak_nm": "peak of the band", "fwhm_nm": "width of the band (FWHM)"
@@ -38,8 +36,12 @@ Sections = Iterator[Section]
 
 
 def exactness(run: Run) -> Sections:
-    """Yield the most that any filter has at each pair of two parameters."""
-    table = _map_of_search(run) if run.output.map is not None else _map_of_grid(run)
+    """Yield the most over a swept grid of two edges."""
+    yield from exactness_of(run, _map_of_grid(run))
+
+
+def exactness_of(run: Run, table: pd.DataFrame | None) -> Sections:
+    """Yield the most that any filter has at each pair of two parameters, from a table of these."""
     if table is None or run.hero not in run.here:
         return
     known = np.isfinite(table.to_numpy(dtype=float))
@@ -54,7 +56,7 @@ def exactness(run: Run) -> Sections:
     title = f"Most {words_of(goal)} / {goal.unit}".rstrip(" /")
     mark = (best[0], best[1]) if np.isfinite(best).all() else None
     panel = Map(
-        f"{title}: {words[1]} over {words[0]}", _around(words[0], x), _around(words[1], y), "", x, y, heights,
+        f"{title}: {words[1]} over {words[0]}", around(words[0], x), around(words[1], y), "", x, y, heights,
         None if level is None else (level, f"{run.reference} {level:.0f}"), mark,
     )  # fmt: skip
     rows = {}
@@ -64,25 +66,16 @@ def exactness(run: Run) -> Sections:
     columns = {"best": Column("best", "nm"), "range": Column(f"more than {run.reference}, of those computed")}
     yield Section(
         "How exact it must be",
-        Table.of(_by_column(columns, rows), head="parameter"),
+        Table.of(by_column(columns, rows), head="parameter"),
         (panel,),
         "Gray: no filter meets the constraints there.",
     )
 
 
-def _by_column(
+def by_column(
     columns: Mapping[str, Column], rows: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, tuple[Column, dict[str, Any]]]:
     return {key: (column, {name: row.get(key) for name, row in rows.items()}) for key, column in columns.items()}
-
-
-def _map_of_search(run: Run) -> pd.DataFrame | None:
-    search, cells = run.study.search, run.output.map
-    if cells is None or search is None or not search.map:
-        return None
-    x, y = (list(search.map) * 2)[:2]
-    most = cells.assign(most=cells["objective"].where(cells["feasible"]))
-    return most.pivot_table(index=y, columns=x, values="most", dropna=False)
 
 
 def _map_of_grid(run: Run) -> pd.DataFrame | None:
@@ -102,93 +95,10 @@ def _map_of_grid(run: Run) -> pd.DataFrame | None:
     return table
 
 
-def _around(words: str, numbers: Values) -> Axis:
+def around(words: str, numbers: Values) -> Axis:
     """Return an axis over cells around numbers."""
     half = (numbers[-1] - numbers[0]) / max(1, len(numbers) - 1) / 2
     return Axis(words, "nm", float(numbers[0] - half), float(numbers[-1] + half))
-
-
-def bands(run: Run) -> Sections:
-    """Yield the widest absorption band of a map that has as much as each other design."""
-    rows = widest_bands(run.output, run.values(run.goal.name))
-    columns = {
-        "wanted": Column(words_of(run.goal), unit_of(run.goal)),
-        "fwhm_nm": Column("widest band, FWHM", "nm", promise=True), "peak_nm": Column("peak", "nm"),
-        "absorbance": Column("absorbance"), "mol_per_l": Column("concentration", "mol/l"),
-        "percent_by_weight": Column("by weight", "%"),
-    }  # fmt: skip
-    if rows:
-        table = Table.of(_by_column(columns, rows), reference="", hero=run.hero, head="as much as")
-        yield Section(
-            "The weakest band that is enough", table, note="Between cells of the map; decadic, in a film of 0.8 µm."
-        )
-
-
-def norms(run: Run) -> Sections:
-    """Yield every pair of a yellow and a red LED that a norm allows."""
-    regions, population = run.output.regions, run.study.population
-    if regions is None or population is None:
-        return
-    wanted = population.wanted_dn
-    for norm, of in regions.groupby("norm", sort=False):
-        rows = {
-            run.names[number]: {
-                "share": float(cells["separated"].sum() / cells["pairs"].sum()),
-                "below": float(cells["below_rggb"].sum() / cells["pairs"].sum()),
-                "any": float(cells["chromatic_below_rggb"].sum() / cells["pairs"].sum()),
-                "least": float(cells["least_dn"].min()),
-            }
-            for number, cells in ((int(key), cells) for key, cells in of.groupby("design_id", sort=False))  # type: ignore[arg-type]
-            if number in run.names
-        }
-        columns = {
-            "share": Column(f"pairs with {wanted:g} DN" if wanted else "pairs", SHARE, "more"),
-            "least": Column("least", "DN", "more"),
-            "below": Column(f"below {run.reference}", SHARE),
-            "any": Column(f"below {run.reference}, any brightness", SHARE),
-        }
-        panels = []
-        for name in dict.fromkeys((run.hero, run.reference)):
-            part = of[of["design_id"] == run.here[name]["design_id"]] if name in run.here else of[:0]
-            if len(part):
-                table = part.pivot_table(index="yellow_nm", columns="red_nm", values="least_dn", aggfunc="min")
-                x, y = table.columns.to_numpy(dtype=float), table.index.to_numpy(dtype=float)
-                level = (float(wanted), f"{wanted:g} DN") if wanted else None
-                panels.append(Map(
-                    f"{name}: least separation / DN", _around("peak of the red LED", x), _around("peak of the yellow LED", y),
-                    "", x, y, table.to_numpy(dtype=float), level, most=float(of["least_dn"].max()),
-                ))  # fmt: skip
-        table = Table.of(_by_column(columns, rows), reference=run.reference, hero=run.hero)
-        title = f"Lamps that {str(norm).replace('_', ' ').upper()} allows"
-        yield Section(title, table, tuple(panels), "Single LEDs, modeled; all pairs counted equally.")
-
-
-def deep_reds(run: Run) -> Sections:
-    """Yield from which red on designs fall below the reference."""
-    limits = run.output.lamp_limits
-    if limits is None:
-        return
-    rows: dict[str, dict[str, Any]] = {}
-    known = limits[limits["design_id"].isin([*run.names]) & np.isfinite(limits["red_limit_nm"])]
-    for number, of in known.groupby("design_id", sort=False):
-        row = rows.setdefault(run.names[int(number)], {})
-        for quantity, part in of.groupby("quantity", sort=False):
-            key = "any" if str(quantity).startswith("chromatic") else "equal"
-            peaks = float(part["red_limit_nm"].min()), float(part["red_limit_nm"].max())
-            row[key] = Marks([peaks], (), span(peaks, "nm"))
-        deepest = of[~of["quantity"].str.startswith("chromatic")].dropna(subset=["deepest_ratio"])
-        if len(deepest):
-            row["deepest"] = span(deepest["deepest_ratio"].tolist())
-            row["at"] = float(deepest["deepest_nm"].iloc[0])
-    ends = [end for row in rows.values() for key in ("any", "equal") if key in row for end in row[key].spans[0]]
-    if rows:
-        axis = Axis("", "nm", min(ends) - 2, max(ends) + 2)
-        group = f"peak of the red LED from which it is below {run.reference}, by the LED's shape"
-        columns = {
-            "equal": Column("equal brightness", axis=axis, group=group), "any": Column("any brightness", axis=axis, group=group),
-            "deepest": Column(f"times {run.reference} at the deepest red"), "at": Column("deepest red", "nm"),
-        }  # fmt: skip
-        yield Section("Deeper reds", Table.of(_by_column(columns, rows), hero=run.hero))
 
 
 def clouds(run: Run) -> Sections:
@@ -197,7 +107,7 @@ def clouds(run: Run) -> Sections:
     for cfa, (x, y) in run.study.clouds.items():
         plain = [name for name, row in run.here.items() if row["kind"] == REFERENCE and name == cfa]
         name = run.hero if run.hero in run.here and run.here[run.hero]["cfa"] == cfa else next(iter(plain), "")
-        points = run.output.points
+        points = run.output.tables[POINTS]
         own = points[points["design_id"] == run.here[name]["design_id"]] if name else points[:0]
         if not len(own):
             continue
@@ -214,109 +124,9 @@ def clouds(run: Run) -> Sections:
         yield Section("What the pixels read", None, tuple(panels))
 
 
-def tasks(run: Run) -> Sections:
-    """Yield the measures of other tasks."""
-    if run.study.tasks is not None and (table := measures(run)).rows:
-        yield Section(f"Other tasks, times as good as {run.reference}", table)
-
-
-def colors(run: Run) -> Sections:
-    """Yield color error against noise under two lights."""
-    traded, panels = run.output.error_against_noise, []
-    if traded is None:
-        return
-    for light, of in list(traded[traded["scenario"] == run.output.scenarios[0]].groupby("light", sort=False))[:2]:
-        lines = {
-            str(name): (curve["snr"].to_numpy(dtype=float), curve["delta_e_mean"].to_numpy(dtype=float))
-            for name, curve in ((name, part.sort_values("snr")) for name, part in of.groupby("name", sort=False))
-        }
-        x, y = (np.concatenate([line[at] for line in lines.values()]) for at in (0, 1))
-        across, up = axis_over("SNR of 18 % gray", "", x, log=True), axis_over("", "", y, log=True)
-        title = f"Mean color error ΔE00, {LIGHTS.get(str(light).upper(), light)}"
-        panels.append(Lines(title, across, up, run.hero, lines=lines))
-    yield Section(
-        "Color against noise",
-        None,
-        tuple(panels),
-        "Better is down and to the right: a stronger color matrix multiplies noise.",
-    )
-
-
-def uncertain(run: Run) -> Sections:
-    """Yield quantiles over random sensors."""
-    known = run.output.uncertainty
-    if known is None or UNCLIPPED in run.facts.warnings:
-        return
-    of = known[(known["quantity"] == run.goal.name) & (known["scenario"] == run.scene)]
-    axis = axis_over("", unit_of(run.goal), [*of["dn_5"], *of["dn_95"]], log=False)
-    rows = {}
-    for row in of.to_dict("records"):
-        ends = float(row["dn_5"]), float(row["dn_95"])
-        ratio = span([row["ratio_5"], row["ratio_95"]]) if row["name"] != run.reference else ""
-        rows[str(row["name"])] = {
-            "track": Marks([ends], (), span(ends, unit_of(run.goal))),
-            "ratio": ratio,
-            "least": ends[0],
-        }
-    columns = {
-        "track": Column(f"{words_of(run.goal)}, 5 to 95 % of random sensors", axis=axis),
-        "ratio": Column(f"times {run.reference} of the same sensor"),
-        "least": Column("95 % have", unit_of(run.goal), "more", promise=True),
-    }
-    if rows:
-        table = Table.of(_by_column(columns, rows), reference=run.reference, hero=run.hero)
-        yield Section("If the sensor's curves are uncertain", table, note="Before clipping and rounding.")
-
-
-def yields(run: Run) -> Sections:
-    """Yield what a share of other random lamps and cameras has."""
-    known = run.output.yields
-    if known is None:
-        return
-    of = known[known["scenario"] == run.scene]
-    for name, part in of.groupby("quantity", sort=False):
-        column, share = run.output.columns[str(name)], float(part["share"].iloc[0])
-        axis = axis_over("", unit_of(column), [*part["dn_low"], *part["dn_high"]], log=False)
-        rows = {
-            str(row["name"]): {
-                "track": Marks(
-                    [(row["dn_low"], row["dn_high"])], (), span((row["dn_low"], row["dn_high"]), unit_of(column))
-                ),
-                "dn": float(row["dn"]),
-            }
-            for row in part.to_dict("records")
-        }
-        what = f"{100 * share:.10g} % of {int(part['draws'].iloc[0]):,} other draws have"
-        columns = {
-            "dn": Column(what, unit_of(column), "more", promise=True),
-            "track": Column("95 % interval of that", axis=axis),
-        }
-        table = Table.of(_by_column(columns, rows), reference=run.reference, hero=run.hero)
-        yield Section(f"On other random draws: {words_of(column)}", table, note="Before clipping and rounding.")
-
-
-def left_out(run: Run) -> Sections:
-    """Yield the largest falls of the objective where a lamp was left out of the search."""
-    of = run.output.left_out
-    if of is None:
-        return
-    worst = of.sort_values("fall", ascending=False).head(6)
-    rows = {
-        str(row["signal"]): {"kept": row["objective"] - row["fall"], "fall": row["fall"]}
-        for row in worst.to_dict("records")
-    }
-    unit = unit_of(run.output.goal)
-    columns = {"kept": Column("with that lamp again", unit), "fall": Column("less than with it in the search", unit)}
-    yield Section(
-        "Searched without one lamp",
-        Table.of(_by_column(columns, rows), head="lamp"),
-        note=f"Mean of all {len(of)}: {amount(float(of['fall'].mean()), unit)} less; leave_one_out.parquet has each.",
-    )
-
-
 def tiles(run: Run) -> Sections:
     """Yield the best tile of each level of light, and what none exceeds."""
-    of, search = run.output.tiles, run.facts.search
+    of, search = run.output.tables.get(TILES), run.facts.search
     if of is None or search is None or not search.tiles:
         return
     unit, rows = unit_of(run.output.goal), {}
@@ -336,22 +146,7 @@ def tiles(run: Run) -> Sections:
         **{name: Column(words, "DN", group="as it is read out") for name, words in zip(OF_TILES, COUNTED.values(), strict=True)},
     }  # fmt: skip
     counts = joined([f"{count} {status}" for status, count in search.tiles.items() if count])
-    yield Section("Over all tiles", Table.of(_by_column(columns, rows), head="at least"), note=f"Tiles: {counts}.")
-
-
-def published(run: Run) -> Sections:
-    """Yield printed figures beside those of the run."""
-    of = comparison_with_published(run.output)
-    for table, part in of.groupby("table", sort=False):
-        rows = {
-            f"{row['cfa']} {row['quantity']}": {"paper": row["paper"], "ours": row["ours"], "error": row["error"]}
-            for row in part.to_dict("records")
-        }
-        columns = {"paper": Column("published"), "ours": Column("this run"), "error": Column("difference")}
-        shown = dict(list(rows.items())[:_MOST_ROWS])
-        more = len(rows) - len(shown)
-        note = f"{more} more in paper_comparison.csv." if more else ""
-        yield Section(f"Published: {table}", Table.of(_by_column(columns, shown), head="figure"), note=note)
+    yield Section("Over all tiles", Table.of(by_column(columns, rows), head="at least"), note=f"Tiles: {counts}.")
 
 
 def sensor(run: Run) -> Sections:
@@ -365,10 +160,24 @@ def sensor(run: Run) -> Sections:
     yield Section("Sensor and lamps", None, (panel, *(filters(run) if run.series else ())))
 
 
-SECTIONS: tuple[Callable[[Run], Sections], ...] = (
-    *(exactness, bands, norms, deep_reds, clouds, tasks, colors, uncertain, yields, tiles, left_out, published, sensor),
-)
-"""In the order of a page."""
+SECTIONS: dict[Callable[[Run], Sections], int] = {
+    exactness: 10,
+    clouds: 50,
+    tiles: 100,
+    sensor: 130,
+}
+"""Sections of the core with their ranks: lower ones come first."""
+
+
+def sections_of(run: Run) -> Sections:
+    """Yield the sections of a run, those of features among them, in the order of their ranks."""
+    every: dict[Callable[[Run], Sections], int] = {**SECTIONS}
+    for module in modules("page"):
+        every |= getattr(module, "SECTIONS", {})
+    for of in sorted(every, key=lambda section: every[section]):
+        yield from of(run)
+
+
 Pairs = list[tuple[str, str]]
 _SCENE: tuple[tuple[str, Callable[[Scene], Any], str], ...] = (
     ("f/", lambda scene: scene.optics.f_number, ""),
@@ -471,8 +280,7 @@ def method(run: Run) -> Pairs:
                 f"{facts.check.rows:,} rows once more, which took {facts.check.slower:.2g} times as long a row",
             )
         )
-    if run.output.audited is not None:
-        found.append(("audited", f"all scenes: at most {digits(float(run.output.audited['realized_dn'].max()))} DN"))
+    found += [line for line_of in gathered("METHOD", "page").values() for line in line_of(run)]
     if search is not None:
         how = " and ".join(filter(None, (search.algorithm, search.refinement)))
         ended = "" if search.converged else ", none converged"
@@ -531,4 +339,4 @@ def table_of(frame: pd.DataFrame, head: Sequence[str], most: int = _MOST_ROWS) -
         for row in frame.head(most).to_dict("records")
     }
     columns = {str(key): Column(str(key).replace("_", " ")) for key in keys}
-    return Table.of(_by_column(columns, rows), head=", ".join(head))
+    return Table.of(by_column(columns, rows), head=", ".join(head))

@@ -12,6 +12,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from ..camera.curve_errors import UNCLIPPED
 from ..metrics.columns.chromatic import CHROMATIC_CSD
 from ..metrics.columns.color_separation import CSD
 from ..metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD, PIXEL_CSD
@@ -21,7 +22,6 @@ from ..results.manifest import Manifest
 from ..results.output import read_output
 from ..results.tables import ALL_SENSORS, REFERENCE, REPORT, RESULTS, SEARCHED, read_table
 from ..runs.all_sensors import ALL
-from ..runs.uncertainty import UNCLIPPED
 from ..spectra.lights import pair_name
 from ..study import SensorAndLights, folder_name
 from .numbers import joined, span
@@ -122,7 +122,7 @@ def report_of_sensors(folder: Path, runs: Sequence[SensorRun] = ()) -> Report:
 
 def _ratios(member: SensorAndLights, run: Run) -> Iterator[dict[str, Any]]:
     """Yield the figures of each design, times those of the reference of the same sensor."""
-    of, known = run.here[run.reference], run.output.uncertainty
+    of, known = run.here[run.reference], run.output.tables.get("uncertainty.parquet")
     known = (
         None
         if known is None or UNCLIPPED in run.facts.warnings

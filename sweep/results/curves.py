@@ -37,7 +37,7 @@ class KeptCurves:
     """Curves of a run.
 
     QE of the sensor by name, photons per nm by type and name of the signal, QE of the designs that are drawn and of
-    others on the front by `design_id` and channel, of the limit's filter by CFA, spectra of own tasks that are from
+    others on the front by `design_id` and channel, of the limit's filter by CFA, curves of features that are from
     files by task and class, and by file and column, absorbances of colorants in the order of their numbers.
     """
 
@@ -47,7 +47,7 @@ class KeptCurves:
     drawn: dict[int, FilterCurves] = field(default_factory=dict)
     on_front: dict[int, FilterCurves] = field(default_factory=dict)
     limits: dict[str, PerWavelength] = field(default_factory=dict)
-    tasks: dict[tuple[str, str], PerWavelength] = field(default_factory=dict)
+    features: dict[tuple[str, str], PerWavelength] = field(default_factory=dict)
     colorants: dict[str, PerWavelength] = field(default_factory=dict)
 
     @property
@@ -66,7 +66,7 @@ class KeptCurves:
     def _rows(self) -> Iterator[tuple[str, str, PerWavelength, str | None, int | None, str | None]]:
         yield from ((_QE, name, values, None, None, None) for name, values in self.sensor.items())
         yield from ((_LIGHT, name, values, kind, None, None) for (kind, name), values in self.lights.items())
-        yield from ((_TASK, name, values, owner, None, None) for (owner, name), values in self.tasks.items())
+        yield from ((_TASK, name, values, owner, None, None) for (owner, name), values in self.features.items())
         for what, designs in ((_DESIGN, self.drawn), (_ON_FRONT, self.on_front)):
             for design_id, channels in designs.items():
                 for channel, values in channels.items():
@@ -111,7 +111,7 @@ class KeptCurves:
                 designs = curves.drawn if kind == _DESIGN else curves.on_front
                 designs.setdefault(row["design_id"], {})[row["channel"]] = curve
             elif kind in (_LIGHT, _TASK):
-                (curves.lights if kind == _LIGHT else curves.tasks)[owner, name] = curve
+                (curves.lights if kind == _LIGHT else curves.features)[owner, name] = curve
             else:
                 {_QE: curves.sensor, _COLORANT: curves.colorants}.get(kind, curves.limits)[name] = curve
         return curves

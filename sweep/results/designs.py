@@ -139,7 +139,7 @@ def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> 
     stored = output.curves
     if data is None and digests.keys() - code:
         return load_study(
-            path, stored=KeptSources(stored.sensor, stored.lights, stored.tasks, stored.colorants), allow_code=code
+            path, stored=KeptSources(stored.sensor, stored.lights, stored.features, stored.colorants), allow_code=code
         )
     study = load_study(path, data, allow_code=code)
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
@@ -151,8 +151,13 @@ def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> 
         stored.colorants,
         {} if colorants is None else dict(zip(colorants.names, colorants.absorbance, strict=True)),
     )
-    check_kept(output, stored.tasks, {} if study.tasks is None else study.tasks.from_files)
+    check_kept(output, stored.features, curves_of_features(study))
     return study
+
+
+def curves_of_features(study: Study) -> dict[tuple[str, str], PerWavelength]:
+    """Return the curves of files that features of a study have, by owner and name."""
+    return {key: curve for feature in study.features.values() for key, curve in feature.curves.items()}
 
 
 def check_kept(output: Output, stored: Mapping[_Key, PerWavelength], computed: Mapping[_Key, PerWavelength]) -> None:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import get_args
 
 import pyarrow as pa
 
+from ..features import gathered
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
 from ..metrics.quantity import DN, UPPER_BOUND, Column, RequestedQuantities
-from ..metrics.registry import listed
-from ..spectra.tasks import TaskColumns, TaskMetric
+from ..metrics.registry import every_feature, listed
 from . import tables as files
 from .curves import SCHEMA
 from .shown import MOST_POINTS
@@ -93,14 +92,10 @@ def described(schema: pa.Schema, columns: Mapping[str, Column]) -> pa.Schema:
 
 
 def columns_table() -> list[str]:
-    """Return a Markdown table of columns, units and meanings.
-
-    `<a>`, `<b>` stand for any two signal types, `<task>` for a task.
-    """
+    """Return a Markdown table of columns, units and meanings; `<a>`, `<b>` stand for any two signal types."""
     types = ("<a>", "<b>")
     rows = [_row(names, "", meaning) for names, meaning in _KEYS.items()]
-    tasks = tuple(TaskColumns("<task>", metric, ("<light>",)) for metric in get_args(TaskMetric))
-    requested = RequestedQuantities(types, types, any_place=True, tasks=tasks, vision=True)
+    requested = RequestedQuantities(types, types, any_place=True, features=every_feature())
     for quantity in listed(requested):
         more = _WITHOUT_CLEAR if quantity.name == CFA_SENSITIVITY else ""
         rows.append(_row((quantity.name,), quantity.unit, quantity.meaning + more))
@@ -122,46 +117,12 @@ FILES = {
     files.LIMITED_BY: "the two lights that limit each CSD, of plain CFAs, named designs, answers of the search, and "
     "of the swept designs that the report draws: `design_id`, `limited_by_<a>_<b>` (for any sampling phase, at the "
     "worst one of the lattice that was computed)",
-    files.ROBUSTNESS: "where the lights have a population, for each plain CFA, named design and answer of the search: "
-    "`design_id`; how many times as large population and production tolerances must be for the worst CSD to fall below "
-    "that of the best plain CFA (`breaks_at`; null: not up to 3 times), and the CSD, lights, shifts and temperatures "
-    "there; "
-    "`yield`, the share of random lamps and cameras with the wanted CSD, with its 95 % interval",
-    files.UNCERTAINTY: "where a study has `uncertainty`, for each plain CFA, named design and answer of the search and "
-    "each CSD (`quantity`), before clipping and rounding: `dn_5`, `dn_50`, `dn_95`, the CSD that so many percent of "
-    "random sensors fall below, with 95 % intervals (`_low`, `_high`); `ratio_...`, `light_ratio_...`, CSD and light "
-    "relative to the `reference` on the same sensor; `ratio_sd`, `light_ratio_sd` and their `correlation`; "
-    "`at_least_dn`, below which no sensor is (without `shift_nm` and `ir_cut_nm`)",
-    files.YIELDS: "where `population.wanted_yield` or `uncertainty.wanted_yield` is stated, for each plain CFA, named "
-    "design and answer of the search: `dn`, the CSD that the `share` of other random lamps and cameras has, which no "
-    "search has looked at (`draws` of them, before clipping and rounding), with a 95 % interval of that of all "
-    "(`dn_low`, `dn_high`)",
-    files.REGIONS_MAP: "where a study asks for maps of color regions, for each plain CFA, named design and answer of "
-    "the search: design_id, norm, peak of the yellow LED (yellow_nm) and of the red one (red_nm), how many pairs of "
-    "widths the norm allows (pairs), how many of these have the wanted distance (separated), how many RGGB keeps "
-    "farther apart, also at any brightness (below_rggb, chromatic_below_rggb; empty without RGGB), the smallest "
-    "distance (least_dn) and the widths there (yellow_fwhm_nm, red_fwhm_nm)",
-    files.LAMP_LIMITS: "where lamps fill the field of one scene beside RGGB, for each named design and answer of the "
-    "search, by the shape of a red LED (those of tl16's lamps, modeled, and a Gaussian of 18 nm) and quantity: the "
-    "peak from which on a deeper red is nearer to the study's yellows than with RGGB (`red_limit_nm`), its color there "
-    "(`red_limit_x`, `red_limit_y`) and distance (`red_limit_dn`), the same of reds toward the yellow "
-    "(`yellow_limit_nm`), and from which peak on the distance is below the one that the study wants "
-    "(`wanted_limit_nm`); 630 where that holds at the first red, empty where it does not up to 60 nm from there, "
-    "or 20 nm from an end of the wavelengths; and its distance over RGGB's (`deepest_ratio`) at the deepest peak of "
-    "the study's reds (`deepest_nm`)",
-    files.LEFT_OUT: "where each light is left out of a search in turn: the objective (of a worst case the nominal "
-    "quantity, too), signal_type, signal, the optimum that was `seen`, the same design `with_it`, and the `fall`",
-    files.SENSOR_MAP: "where a scene has a `field`, for each plain CFA, named design and answer of the search: "
-    "`design_id`, relative image `height`, `cra_deg` and the CSDs there, DN, before clipping and rounding",
     files.SEARCH_LOG: "every evaluation of the search and of its front: "
     + ", ".join(files.search_schema(["<parameters>"]).names),
     files.COMBINATIONS: "where a search chooses from colorants, every combination that was tried, the best first: how "
     "many `colorants`, their numbers and names, the absorbance of each at its peak in 0.8 um (`absorbance_1`), for "
     "catalogs of molar extinction its concentration (`mol_per_l_1`), `thickness_um`, objective and sensitivity before "
     "clipping and quantization, `violation` and `feasible`",
-    files.MAP: "where a search has a map, a row per pair of values: all parameters of the best design there, objective "
-    "and sensitivity before clipping and quantization, `violation` and `feasible`; with `colorants.assumed` the "
-    "concentration of a single absorption band in a film of 0.8 um, `mol_per_l` and `percent_by_weight`",
     files.FRONT: "results of the search at each level of sensitivity, and the upper bound there; between two levels "
     "rows with the bound alone: " + ", ".join(files.front_schema(["<parameters>"]).names),
     files.TILES: "of a search over tiles, a row for each tile at each level of light (`cfa_sensitivity_min`; null: "
@@ -186,33 +147,22 @@ FILES = {
     "design and answer of the search (`name`), channel and signal type, the number `at` which the median signal "
     "reaches the threshold of each capture (from 1 on), or saturation of the last one; inf: at none of the series, "
     "-inf: at all",
-    files.TRADED: "where a study has the task `color`: mean color error against luminance SNR, a row per design, "
-    "light and regularization of the color matrix",
-    files.VISION: "a row per image of the benchmark of vision: design_id, name, cfa, seed, order (of the lenses), "
-    "lamps (seen in training or unseen), image, state, lamp, intensity_cd, background, phantom, distance_m, level, "
-    "and of each reader (observer, prototypes) what it says, its probability (`_p`), and the error to expect "
-    "of that answer, one less its probability by the observer (`_risk`)",
-    files.VISION_CONDITIONS: "of each design at each distance and level of light: csd (DN), dprime and pair_error, the "
-    "smallest or the largest over the pairs of lenses",
-    files.VISION_LEARNING: "of readers that learn, by the number of `images` that they have learned from, distance and "
-    "level of light, lenses in any order: `error`, `risk` (to expect by the ideal observer), `observer_risk`",
     files.ALL_SENSORS: "of a study of several sensors, one filter for all of them and one for all but each: "
     "`designed_on`, space, sensor, lights, `judged` (it was not designed on this one), objective, sensitivities, "
     "violation, `own_best` (objective of the best filter of this one alone) and parameters",
-    files.AUDIT: "rows of `sweep audit`: errors against the reference settings, and those that are allowed",
     files.RESOLVED: "the study with every default written out; a study file itself",
     files.PROVENANCE: "versions, seed, command, machine, plans of the scenes, meanings of the columns",
     files.REPORT: "the report: one file that you can send, without the network",
     "pareto.png": "the filter over the lamps, and separation against the light of all CFAs; also `.svg`",
-    "paper_comparison.csv": "published figures beside ours, where a study gives some; also `.parquet`",
     files.MANIFEST: "owner of the folder, the fingerprint of the study and its inputs, and the SHA-256 of each file",
 }
-"""Every file of a run's folder, in the order in which one asks for them."""
+"""Files of the core in a run's folder, in the order in which one asks for them."""
 
 
 def files_table() -> list[str]:
     """Return a Markdown table of files and contents."""
-    return ["| file | contents |", "| --- | --- |", *(f"| `{name}` | {what} |" for name, what in FILES.items())]
+    every = FILES | gathered("FILES") | gathered("ADDED") | gathered("DRAWN")
+    return ["| file | contents |", "| --- | --- |", *(f"| `{name}` | {what} |" for name, what in every.items() if what)]
 
 
 def _row(names: tuple[str, ...], unit: str, meaning: str) -> str:

@@ -16,7 +16,7 @@ from ..base.disk import is_real_folder, opened, read_plain
 from ..base.errors import OutputError, ValidationIssue
 from .answers import ANSWERS
 from .atomic import LEFT_OVER
-from .tables import FIGURES, RESULTS
+from .tables import RESULTS
 
 LOCK = ".lock"
 OWNER = ".lock-owner"
@@ -108,7 +108,7 @@ def _is_held(path: Path) -> bool:
 
 def clear(output: Path) -> None:
     """Remove half-written files of killed commands and workers, but not through links."""
-    inner = (output / RESULTS, output / ANSWERS, output / FIGURES)
+    inner = (output / RESULTS, output / ANSWERS)
     for folder in (output, *(inner_folder for inner_folder in inner if is_real_folder(inner_folder))):
         for path in folder.iterdir():
             if re.fullmatch(LEFT_OVER, path.name) and not is_real_folder(path):

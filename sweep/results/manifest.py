@@ -21,22 +21,18 @@ from ..study import SensorAndLights
 from .atomic import write_bytes
 from .dataset import part_paths, strange_entries
 from .tables import (
-    AUDIT,
-    FIGURES,
-    MADE_BY_RUN,
     MANIFEST,
     PROVENANCE,
     RESULTS,
-    is_drawn,
     is_of_run,
     json_of,
+    made_by_run,
     read_table,
     write_table,
 )
 
 _MOST_BYTES = 2**32
 """No file of a run is larger."""
-_FOLDERS = (FIGURES, RESULTS)
 _MISSING, _DAMAGED, _STRANGE = "is missing", "is damaged", "is not of this run"
 _DIGEST, _FILES = "digest", "files"
 
@@ -164,7 +160,7 @@ class Manifest:
 
     def _linked(self, name: str) -> bool:
         """Return whether a link on the way to a file leads out of the folder."""
-        return any(name.startswith(f"{inner}/") and is_link(self.folder / inner) for inner in _FOLDERS)
+        return name.startswith(f"{RESULTS}/") and is_link(self.folder / RESULTS)
 
     def require(self, names: Iterable[str]) -> None:
         """Raise OutputError if a file is missing or damaged, with its name."""
@@ -178,7 +174,7 @@ class Manifest:
         return self._names_of_run()
 
     def _names_of_run(self) -> list[str]:
-        inner = [f"{folder}/{name}" for folder in _FOLDERS for name in _names(self.folder / folder)]
+        inner = [f"{RESULTS}/{name}" for name in _names(self.folder / RESULTS)]
         return sorted(name for name in [*_names(self.folder), *inner] if is_of_run(name))
 
     def begin(self, facts: Mapping[str, Any]) -> None:
@@ -226,8 +222,8 @@ class Manifest:
             self.save()
 
     def discard_derived(self) -> None:
-        """Remove report and audit, which follow from tables that are gone."""
-        self.remove([name for name in self.files if is_drawn(name) or name == AUDIT])
+        """Remove the report, and what commands added, which follow from tables that are gone."""
+        self.remove([name for name in self.files if not _by_run(name)])
 
     def discard(self) -> None:
         """Remove the manifest of a run without files."""
@@ -251,7 +247,7 @@ def issues_of(folder: Path, wrong: Mapping[str, str]) -> list[ValidationIssue]:
 
 
 def _by_run(name: str) -> bool:
-    return name in MADE_BY_RUN or name.startswith(f"{RESULTS}/")
+    return name in made_by_run() or name.startswith(f"{RESULTS}/")
 
 
 def _digest(content: Mapping[str, Any]) -> str:

@@ -16,10 +16,11 @@ from ruamel.yaml.error import YAMLError
 
 from ..base.errors import OutputError, ValidationIssue
 from ..camera.mosaic import Mosaic
+from ..features import gathered
 from ..metrics.bound import Bound
 from ..metrics.columns.exposure import EXPOSURE
 from ..metrics.objective import Objective
-from ..metrics.quantity import YIELD, Column
+from ..metrics.quantity import Column
 from ..study import StudySection, folder_name
 from . import tables as files
 from .curves import SCHEMA as CURVES_SCHEMA
@@ -29,7 +30,7 @@ from .identity import MODEL_VERSION
 from .lock import in_use
 from .manifest import Manifest
 from .shown import MS, Counts, per_exposure, shown_rows
-from .tables import NAMED, NAMED_KINDS, PROVENANCE, REFERENCE, RESOLVED, SEARCHED, SWEPT, read_table
+from .tables import NAMED, NAMED_KINDS, PROVENANCE, REFERENCE, RESOLVED, SEARCHED, SWEPT, made_by_run, read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,8 +56,6 @@ _COLUMNS: dict[str, Sequence[str]] = {
     files.POINTS: ["design_id", "signal_type", "signal", "channel", "dn"],
     files.FRONT: files.front_schema(()).names,
     files.TILES: files.tiles_schema(()).names,
-    files.LEFT_OUT: ["objective", "signal_type", "signal", "fall"],
-    files.ROBUSTNESS: ["design_id", "breaks_at", "breaks_broadening"],
 }
 """Columns that a report needs of the tables beside the result table."""
 
@@ -65,13 +64,8 @@ _COLUMNS: dict[str, Sequence[str]] = {
 class Output:
     """Results of a run; `table` has the rows that a report shows.
 
-    `study`: the study that was run, and `resolved` its file. `audited`: rows of `sweep audit`; `left_out`: a row per
-    light that was left out of a search; `regions`: cells of the maps of color regions; `lamp_limits`: reds that designs
-    fail on. `error_against_noise`: color error against noise;
-    `places`: separations over the sensor; `map`: the best objective over two parameters; `handovers`: where captures of
-    an HDR pixel are full; `worst`: worst values over series; `saturated`: signals that fill a pixel; `uncertainty`:
-    quantiles over random sensors; `yields`: of other random lamps and cameras; `vision`: tables of the
-    benchmark of vision by their files' names.
+    `study`: the study that was run, and `resolved` its file; `tables`: those beside the rows by their files' names, as
+    far as the run has them.
     """
 
     folder: Path
@@ -81,23 +75,7 @@ class Output:
     table: pd.DataFrame
     counts: Counts
     curves: KeptCurves
-    points: pd.DataFrame
-    front: pd.DataFrame | None
-    tiles: pd.DataFrame | None
-    crossings: pd.DataFrame | None
-    audited: pd.DataFrame | None
-    left_out: pd.DataFrame | None
-    regions: pd.DataFrame | None
-    lamp_limits: pd.DataFrame | None
-    error_against_noise: pd.DataFrame | None
-    places: pd.DataFrame | None
-    map: pd.DataFrame | None
-    handovers: pd.DataFrame | None
-    worst: pd.DataFrame | None
-    saturated: pd.DataFrame
-    uncertainty: pd.DataFrame | None
-    yields: pd.DataFrame | None
-    vision: Mapping[str, pd.DataFrame]
+    tables: Mapping[str, pd.DataFrame]
     _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def cached(self, key: object, make: Callable[[], _Made]) -> _Made:
@@ -217,7 +195,7 @@ class Output:
         return self.kind(*NAMED_KINDS)
 
 
-def read_output(folder: Path, *, audited: bool = True) -> Output:
+def read_output(folder: Path, *, with_added: bool = True) -> Output:
     """Read a finished run.
 
     Raises OutputError: files, which it names, are missing or not as the run wrote them.
@@ -230,9 +208,8 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     if PROVENANCE not in manifest.files:
         state = "a run goes on here" if in_use(folder) else "a run was interrupted here, and the same command continues"
         raise OutputError(ValidationIssue(state, str(folder), allowed="a folder that `sweep run` finished"))
-    optional = (manifest.files.keys() & {*files.MADE_BY_RUN, files.AUDIT}).difference(_ALWAYS)
-    if not audited:
-        optional.discard(files.AUDIT)
+    added = gathered("ADDED").keys() if with_added else set[str]()
+    optional = (manifest.files.keys() & (made_by_run() | added)).difference(_ALWAYS)
     manifest.require([*_ALWAYS, *sorted(optional)])
     facts = _mapping(folder / PROVENANCE, json.loads)
     if facts.get("model_version", MODEL_VERSION) != MODEL_VERSION:
@@ -261,11 +238,11 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         name: read_table(folder / name).to_pandas()
         for name in (files.POINTS, files.LIMITED_BY, files.SATURATED, *optional)
     }
-    for name in (files.LIMITED_BY, files.ROBUSTNESS):
+    of_rows = more[files.LIMITED_BY].drop(columns="filter_id", errors="ignore")
+    table = table.merge(of_rows, on="design_id", how="left")
+    for name, put in gathered("ROWS", "page").items():
         if name in more:
-            table = table.merge(more[name].drop(columns="filter_id", errors="ignore"), on="design_id", how="left")
-    if files.YIELDS in more:
-        _put_judged(table, more[files.YIELDS])
+            table = put(table, more[name])
     try:
         curves = KeptCurves.of_table(read_table(folder / files.CURVES))
     except ValueError as error:
@@ -278,32 +255,8 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         table=table,
         counts=Counts.of(provenance.counts, pareto),
         curves=curves,
-        points=more[files.POINTS],
-        front=more.get(files.FRONT),
-        tiles=more.get(files.TILES),
-        crossings=more.get(files.CROSSINGS),
-        audited=more.get(files.AUDIT),
-        left_out=more.get(files.LEFT_OUT),
-        regions=more.get(files.REGIONS_MAP),
-        lamp_limits=more.get(files.LAMP_LIMITS),
-        error_against_noise=more.get(files.TRADED),
-        places=more.get(files.SENSOR_MAP),
-        map=more.get(files.MAP),
-        handovers=more.get(files.HANDOVERS),
-        worst=more.get(files.WORST),
-        saturated=more[files.SATURATED],
-        uncertainty=more.get(files.UNCERTAINTY),
-        yields=more.get(files.YIELDS),
-        vision={name: more[name] for name in files.VISION_TABLES if name in more},
+        tables=more,
     )
-
-
-def _put_judged(table: pd.DataFrame, yields: pd.DataFrame) -> None:
-    """Put the yields of other draws in the place of those that chose the designs, where they were computed."""
-    rows = {design_id: at for at, design_id in table["design_id"].items()}
-    for known in yields.to_dict("records"):
-        if known["design_id"] in rows:
-            table.loc[rows[known["design_id"]], YIELD + known["quantity"]] = known["dn"]
 
 
 def _mapping(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:

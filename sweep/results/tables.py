@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ import pyarrow.parquet as pq
 
 from ..base.errors import OutputError, ValidationIssue
 from ..base.types import Bool, BoolArray
+from ..features import gathered
 from ..metrics.quantity import UPPER_BOUND
 from .atomic import atomic
 
@@ -25,50 +27,25 @@ SCHEMA_VERSION = "4"
 RGGB = "RGGB"
 """The plain CFA that others are compared with, where a study has it."""
 RESULTS, DESIGNS, PARETO = "results.parquet", "designs.parquet", "pareto.parquet"
-SEARCH_LOG = "search.parquet"
-FRONT = "search_front.parquet"
-CURVES = "curves.parquet"
-POINTS = "points.parquet"
-CROSSINGS = "crossings.parquet"
-LIMITED_BY = "limited_by.parquet"
-ROBUSTNESS = "robustness.parquet"
-UNCERTAINTY = "uncertainty.parquet"
-YIELDS = "yields.parquet"
-REGIONS_MAP = "regions.parquet"
-LAMP_LIMITS = "lamp_limits.parquet"
-SENSOR_MAP = "sensor_map.parquet"
-TRADED = "color_noise.parquet"
-COMBINATIONS, MAP = "combinations.parquet", "map.parquet"
-HANDOVERS, WORST, SATURATED = "handovers.parquet", "worst.parquet", "saturated.parquet"
-LEFT_OUT = "leave_one_out.parquet"
-VISION, VISION_CONDITIONS = "vision.parquet", "vision_conditions.parquet"
-VISION_LEARNING = "vision_learning.parquet"
-VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_LEARNING)
-"""Tables of the benchmark of vision: a row per image, per distance and level, per reader and number of images
-that it has learned from, and per light level and state of detections in streets."""
-TILES = "tiles.parquet"
+SEARCH_LOG, FRONT = "search.parquet", "search_front.parquet"
+CURVES, POINTS = "curves.parquet", "points.parquet"
+LIMITED_BY, SATURATED = "limited_by.parquet", "saturated.parquet"
+CROSSINGS, WORST, HANDOVERS = "crossings.parquet", "worst.parquet", "handovers.parquet"
+COMBINATIONS, TILES = "combinations.parquet", "tiles.parquet"
 COUNTED = ("csd", "pixel_csd", "chromatic_csd", "chromatic_pixel_csd")
 """Metrics of separations beside the objective of a search over tiles: of equal brightness or any, also by pixel."""
-AUDIT, ALL_SENSORS = "audit.parquet", "all_sensors.parquet"
+ALL_SENSORS = "all_sensors.parquet"
 PROVENANCE = "provenance.json"
 RESOLVED = "study.resolved.yaml"
 MANIFEST = "manifest.json"
-REPORT, FIGURES, VISION_FIGURES = "report.html", "figures", "vision-"
-MADE_BY_RUN = frozenset(
+REPORT = "report.html"
+_OF_CORE = frozenset(
     (
-        *(DESIGNS, PARETO, SEARCH_LOG, FRONT, CURVES, POINTS, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
-        LAMP_LIMITS,
-        *(SENSOR_MAP, TRADED, LEFT_OUT, COMBINATIONS, MAP, HANDOVERS, WORST, SATURATED),
-        *(UNCERTAINTY, YIELDS, TILES),
-        *(*VISION_TABLES, ALL_SENSORS, PROVENANCE, RESOLVED),
+        *(DESIGNS, PARETO, SEARCH_LOG, FRONT, CURVES, POINTS, LIMITED_BY, SATURATED, CROSSINGS, WORST, HANDOVERS),
+        *(COMBINATIONS, TILES, ALL_SENSORS, PROVENANCE, RESOLVED),
     )
 )
-"""Files that a run itself writes beside its rows; the report draws from them, `sweep audit` adds a table."""
-_DRAWN = re.compile(
-    r"report\.html|(sensors|cfas|pareto)\.(png|svg)|pareto-\d+\.svg|paper_comparison\.(csv|parquet)"
-    r"|figures/((series|places)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
-    r"|regions-\d+|map|captures-\d+|vision-(errors|ranks|street))\.svg"
-)
+_DRAWN = re.compile(r"report\.html|(sensors|cfas|pareto)\.(png|svg)|pareto-\d+\.svg")
 _OF_ROWS = re.compile(rf"{re.escape(RESULTS)}(/part-\d{{8}}\.parquet)?")
 _PARAMETERS = "cfa_sweep_parameters"
 _ROWS_AT_ONCE = 65_536
@@ -99,14 +76,21 @@ NAMED_KINDS = (REFERENCE, NAMED, SEARCHED)
 """Kinds of which there are few rows."""
 
 
+@lru_cache(maxsize=1)
+def made_by_run() -> frozenset[str]:
+    """Return the files that a run itself writes beside its rows; the report draws from them."""
+    return _OF_CORE.union(gathered("FILES"))
+
+
 def is_drawn(name: str) -> bool:
     """Return whether a file belongs to the report."""
-    return _DRAWN.fullmatch(name) is not None
+    return _DRAWN.fullmatch(name) is not None or name in gathered("DRAWN")
 
 
 def is_of_run(name: str) -> bool:
     """Return whether a name is one that commands give to files of a run, beside its manifest."""
-    return name in MADE_BY_RUN or name == AUDIT or is_drawn(name) or _OF_ROWS.fullmatch(name) is not None
+    known = name in made_by_run() or name in gathered("ADDED") or is_drawn(name)
+    return known or _OF_ROWS.fullmatch(name) is not None
 
 
 def result_schema(

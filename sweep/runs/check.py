@@ -20,6 +20,7 @@ from ..designs.block import CurveBlock
 from ..designs.space import Space
 from ..metrics.columns.chromatic import CHROMATIC_CSD
 from ..metrics.columns.color_separation import CSD
+from ..metrics.metric import Metric
 from ..metrics.objective import COMBINED
 from ..metrics.places import oriented
 from ..metrics.quantity import DN, Quantity
@@ -43,8 +44,6 @@ _SHARE, _SAME = 1e-2, 1e-6
 """Difference of a column that is allowed, relative: of one that is not in DN, and of one that no light determines."""
 _CHROMATIC_SHARE = 1e-3
 """The same of distances of lamps of any brightness, beside the tolerance."""
-_IMAGES = "images"
-"""What metrics need that are drawn by the study's seed alone: they are not compared, nor are metrics of user code."""
 
 Row = Mapping[str, Any]
 
@@ -71,9 +70,10 @@ def _compared(study: Study, rules: Rules, space: Space, scenario: str, rows: Seq
     points = np.array([[row[name] for name in space.parameters] for row in rows], dtype=float)
     setup = study.setup(space, scenario)
     reference = replace(setup.with_all_effects, accuracy=REFERENCE)
-    needs = {name: metric.needs for metric in METRICS for name in (q.name for q in metric.quantities(rules.requested))}
+    owner = {name: metric for metric in METRICS for name in (q.name for q in metric.quantities(rules.requested))}
+    slow = {name for name, feature in study.features.items() if feature.slow}
     named = {name: of for name, of in rules.at(scenario, rules.wanted).quantities.items() if name in rows[0]}
-    images = {name for name, of in named.items() if needs.get(of.of or name) == _IMAGES}
+    images = {name for name, of in named.items() if (own := owner.get(of.of or name)) is not None and own.needs in slow}
     if images & set(study.objective.weights):
         images.add(COMBINED)
     computed = {name: of for name, of in named.items() if name not in images}
@@ -102,7 +102,7 @@ def _compared(study: Study, rules: Rules, space: Space, scenario: str, rows: Seq
                     more = _CHROMATIC_SHARE * abs(pair[1]) * ("chromatic" in name)
                     differences.append((_difference(*pair), allowed_dn + more, name))
                 else:
-                    bound = _allowed_share(compared[name], needs, row, allowed_dn)
+                    bound = _allowed_share(compared[name], owner, row, allowed_dn)
                     differences.append((_share(compared[name], *pair), bound, name))
             worst = max(differences, key=lambda of: of[0] / of[1], default=(0.0, 1.0, ""))
             result[index] |= dict(zip((realized, allowed, what), worst, strict=True))
@@ -126,12 +126,13 @@ def _share(quantity: Quantity, stored: float, exact: float) -> float:
     return difference / size if 0 < difference < math.inf else difference
 
 
-def _allowed_share(quantity: Quantity, needs: Mapping[str, str], row: Row, allowed_dn: float) -> float:
+def _allowed_share(quantity: Quantity, owner: Mapping[str, Metric], row: Row, allowed_dn: float) -> float:
     """Return the relative difference of a column that is no issue.
 
     Of a figure of one pair under noise also that of its distance in DN which the tolerance allows.
     """
-    if needs.get(quantity.of or quantity.name) in ("filters", "tasks", "parameters"):
+    computed_by = owner.get(quantity.of or quantity.name)
+    if computed_by is not None and not computed_by.of_scene:
         return _SAME
     pairs = [quantity.pair] if quantity.pair is not None else class_pairs(quantity.states)
     metric = CHROMATIC_CSD if "chromatic" in quantity.name else CSD

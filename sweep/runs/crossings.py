@@ -20,11 +20,11 @@ from ..metrics.columns.confusion import STATE_ERROR
 from ..metrics.evaluate import evaluate_some
 from ..metrics.quantity import Quantity, RequestedQuantities
 from ..metrics.registry import quantities_of
-from ..results.tables import RGGB
+from ..results.tables import CROSSINGS, RGGB
 from ..spectra.lights import class_pairs, pair_name
 from ..study import Study
 from ..study.axes import series_of
-from .analysis import Analysis, Calls, DesignBetween, designs_between
+from .analysis import Calls, DesignBetween, designs_between, table_of_calls
 from .between import Between, inner_numbers, or_nan
 
 if TYPE_CHECKING:
@@ -213,4 +213,4 @@ def _is_asked(study: Study) -> bool:
     return bool(series_of(study.scenarios))
 
 
-RANGES = Analysis("where ranges end", _is_asked, lambda _: _SCHEMA, _calls)
+RANGES = table_of_calls(CROSSINGS, "where ranges end", _is_asked, lambda _: _SCHEMA, _calls)

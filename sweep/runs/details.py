@@ -2,58 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
 
 from ..base.types import (
-    Array,
-    DesignCurves,
     DesignNumbers,
-    Float,
     FloatArray,
-    IndexArray,
-    Int,
     Parallel,
     Progress,
     delayed,
 )
-from ..camera.field import field_heights, scene_at
 from ..camera.model import scene_model
 from ..camera.setup import Setup
 from ..designs.block import CurveBlock, edges_of_some
 from ..designs.space import Space
 from ..metrics.limiting import LimitingLights, limited_by_name, limiting_lights, limiting_lights_of
-from ..metrics.separation import csd_name, separations
-from ..metrics.smooth import smooth_response
 from ..results.designs import computed_rows, row_curves
 from ..results.tables import LIMITED_BY, POINTS, SEARCHED
-from ..spectra.lights import Pair
 from ..study import Study
-from .analysis import Analysis, Calls, named_designs
+from .analysis import Details, Shown
 from .workers import run_with_progress
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _AT_ONCE, _SWEPT_AT_ONCE = 64, 4096
-_HEIGHTS = 41
-"""Image heights of a sensor map, in equal steps."""
 _MOST_VALUES = 2_000_000
 """Digital numbers that are held at once."""
 _Design = tuple[int, FloatArray]
 """A design's id, and its curves."""
-
-
-@dataclass(frozen=True)
-class Details:
-    """Details of one design."""
-
-    limited_by: Mapping[Pair, str | None] | None = None
-    dn: Float[Array, "signals channels"] | None = None
 
 
 def design_details(
@@ -97,15 +77,10 @@ def _details(setup: Setup, designs: Sequence[_Design]) -> dict[int, Details]:
     return result
 
 
-def limited_by_table(
-    study: Study,
-    details: Mapping[int, Details],
-    points: Int[IndexArray, " points"],
-    parallel: Parallel,
-    progress: Progress,
-) -> pa.Table:
+def limited_by_table(shown: Shown) -> pa.Table:
     """Return `design_id` and `limited_by_<a>_<b>`, the names of two lights, of the designs that are shown."""
-    names = {at: detail.limited_by for at, detail in details.items() if detail.limited_by is not None}
+    study, points = shown.study, shown.points
+    names = {at: detail.limited_by for at, detail in shown.details.items() if detail.limited_by is not None}
     ids = points[~np.isin(points, list(names))]
     ends = np.cumsum([space.size for space in study.spaces])
     scene, number = np.divmod(ids, ends[-1])
@@ -119,13 +94,15 @@ def limited_by_table(
             numbers = number[part] - (ends[space_index] - space.size)
             calls.append(delayed(_limits, study.setup(space, scenarios[scene_index]), space, numbers))
             parts.append(ids[part].tolist())
-    for part, lights in zip(parts, run_with_progress(parallel, calls, "limiting lights", progress), strict=True):
+    for part, lights in zip(
+        parts, run_with_progress(shown.parallel, calls, "limiting lights", shown.progress), strict=True
+    ):
         names |= {design_id: {pair: lights[pair][index] for pair in lights} for index, design_id in enumerate(part)}
-    shown = sorted(names)
+    numbers = sorted(names)
     limits = {
-        limited_by_name(pair): pa.array([names[at].get(pair) for at in shown], pa.string()) for pair in study.pairs
+        limited_by_name(pair): pa.array([names[at].get(pair) for at in numbers], pa.string()) for pair in study.pairs
     }
-    return pa.table({"design_id": pa.array(shown, pa.int64()), **limits})
+    return pa.table({"design_id": pa.array(numbers, pa.int64()), **limits})
 
 
 def _limits(setup: Setup, space: Space, numbers: DesignNumbers) -> LimitingLights:
@@ -139,39 +116,3 @@ def _limits(setup: Setup, space: Space, numbers: DesignNumbers) -> LimitingLight
         block = CurveBlock(space.curves(space.points_of(part), camera.grid.size)) if edges is None else edges
         parts.append(limiting_lights_of(model, block))
     return {pair: np.concatenate([part[pair] for part in parts]) for pair in parts[0]}
-
-
-def _map_schema(study: Study) -> pa.Schema:
-    names = ("height", "cra_deg", *(csd_name(pair) for pair in study.pairs))
-    return pa.schema([("design_id", pa.int64()), *((name, pa.float64()) for name in names)])
-
-
-def _calls(study: Study, rows: pd.DataFrame) -> Calls:
-    """Compute CSDs over the image height before clipping and rounding, with all other effects.
-
-    One row per image height and design, in a scene with a field. For a pulsed light, the smallest over its moments.
-    """
-    for design in sorted(named_designs(study, rows), key=lambda design: int(design.row["design_id"])):
-        if design.setup.scene.field is not None:
-            yield design.key, delayed(_over_heights, design.setup, np.asarray(design.curves, dtype=float))
-
-
-def _over_heights(setup: Setup, curves: DesignCurves) -> list[dict[str, float]]:
-    """Return the rows of one design, the center of the image first."""
-    field, rows = setup.scene.field, list[dict[str, float]]()
-    assert field is not None
-    same = len(field_heights(setup)) == 1
-    for height in np.linspace(0.0, 1.0, _HEIGHTS).tolist():
-        if not rows or not same:
-            response = smooth_response(replace(setup, scene=scene_at(setup.scene, height)), curves)
-            moments = [separations(response[:, case], setup.members) for case in range(response.shape[1])]
-            csds = {csd_name(pair): float(np.min([csd[pair][0] for csd in moments])) for pair in moments[0]}
-        rows.append({"height": height, "cra_deg": field.cra_at(height), **csds})
-    return rows
-
-
-def _has_field(study: Study) -> bool:
-    return any(scene.field is not None for scene in study.scenarios.values())
-
-
-OVER_SENSOR = Analysis("field positions", _has_field, _map_schema, _calls)

@@ -14,6 +14,7 @@ import pyarrow as pa
 from threadpoolctl import threadpool_limits
 
 from ..base.types import DesignNumbers
+from ..features import modules
 from ..results.dataset import encoded_part, part_name
 from ..results.folder import run_in
 from ..results.identity import run_facts
@@ -21,7 +22,6 @@ from ..results.tables import REFERENCE
 from ..search.solver import refinement_of
 from ..search.trade_off import most_searches
 from ..study import Study
-from .held_out import most_evaluations_left_out
 from .rows import Job, parts_of, rules_of, run_job
 
 _SAMPLED_S = 1.0
@@ -164,9 +164,8 @@ def remaining_work_lines(todo: RemainingWork, output: Path) -> Iterator[str]:
         if search.levels:
             most = most_searches(len(search.levels), starts, refined=refined) * per_start
             yield f"Its front: {_count(len(search.levels), 'level')}, {_count(most, 'evaluation')} at most."
-        if study.leaves_one_out:
-            most = most_evaluations_left_out(study, search)
-            yield f"Without one light after the other: {_count(most, 'evaluation')} at most."
+        for module in modules("tables"):
+            yield from getattr(module, "planned", lambda _: ())(study)
     groups: dict[tuple[str, ...], list[str]] = {}
     for name, plan in study.plans.items():
         groups.setdefault(plan.computed, []).append(name)

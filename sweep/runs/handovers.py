@@ -12,9 +12,10 @@ from ..base.types import Array, DesignCurves, Float, FloatArray, MemberNumbers, 
 from ..camera.linear import linear_model
 from ..camera.noise.merge import limits_dn
 from ..camera.setup import Setup
+from ..results.tables import HANDOVERS
 from ..study import Study
 from ..study.axes import series_of
-from .analysis import Analysis, Calls, designs_between
+from .analysis import Calls, designs_between, table_of_calls
 from .between import Between
 
 if TYPE_CHECKING:
@@ -91,4 +92,4 @@ def _is_asked(study: Study) -> bool:
     return bool(study.section.pixel.captures and series_of(study.scenarios))
 
 
-CAPTURES_FULL = Analysis("handovers of captures", _is_asked, lambda _: _SCHEMA, _calls)
+CAPTURES_FULL = table_of_calls(HANDOVERS, "handovers of captures", _is_asked, lambda _: _SCHEMA, _calls)

@@ -23,12 +23,11 @@ from ..metrics.evaluate import evaluate
 from ..metrics.metric import Metric
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Columns, Quantity, RequestedQuantities
-from ..metrics.registry import METRICS
+from ..metrics.registry import METRICS, owners
 from ..metrics.user_metrics import UserMetric
 from ..results.identity import CHUNK
 from ..results.tables import ON_FRONT
 from ..spectra.lights import Pair
-from ..vision.section import SeededVision, Vision
 
 _MOST_LETTERS = 200
 
@@ -49,7 +48,6 @@ class Rules:
     front: tuple[str, str]
     tolerance: Tolerance
     plans: Mapping[str, Plan]
-    vision: Vision | None
     seed: int
     places: Mapping[str, Mapping[str, str | float]]
     in_series: frozenset[str]
@@ -161,7 +159,6 @@ def columns_of_points(
         chromatic=wanted.chromatic,
         family=None if space.filter is None else space.filter.family,
         points=points,
-        images=None if rules.vision is None else SeededVision(rules.vision, rules.seed),
         refined=wanted.names,
     )
     if worst := wanted.of_extreme(WORST_CASE):
@@ -193,7 +190,12 @@ def worst_cases(
         space.curves(points, setup.camera.grid.size, production_error) for production_error in (AS_DESIGNED, *errors)
     ]
     chromatic = [quantity.pair for quantity in worst if quantity.metric == CHROMATIC_CSD and quantity.pair is not None]
-    shifted_cases = [evaluate(model, shifted, user_metrics=user_metrics, chromatic=chromatic) for shifted in curves[1:]]
+    requested = RequestedQuantities(setup.lights.classes, any_place=True, user_metrics=tuple(user_metrics))
+    metrics = owners({quantity.of for quantity in worst}, requested)
+    shifted_cases = [
+        evaluate(model, shifted, user_metrics=user_metrics, metrics=metrics, chromatic=chromatic)
+        for shifted in curves[1:]
+    ]
     cases = [nominal, *shifted_cases]
     if setup.lights.population is not None:
         from ..metrics.members import population_model  # noqa: PLC0415  (only where lights have a population)

@@ -18,7 +18,6 @@ from ..designs.space import Space
 from ..metrics.bound import FEASIBLE, total_violation
 from ..metrics.columns.chromatic import CHROMATIC_CSD
 from ..metrics.columns.exposure import EXPOSURE
-from ..metrics.columns.tasks import PREFIX
 from ..metrics.pareto import non_dominated
 from ..metrics.quantity import DN, Columns, Quantity
 from ..metrics.separation import csd_name
@@ -80,7 +79,9 @@ def parts_of(study: Study) -> list[Part]:
     first_id = 0
     for name, scene in study.scenarios.items():
         small: list[Job] = []
-        light = scene.target is None and not study.states and study.section.vision is None
+        light = (
+            scene.target is None and not study.states and not any(feature.slow for feature in study.features.values())
+        )
         together = light or len(study.scenarios) >= _ENOUGH_SCENES
         for job in _jobs_of(study, name, first_id, sizes):
             if together and sum(other.size for other in (*small, job)) <= _FEW:
@@ -118,8 +119,7 @@ def swept_quantities(study: Study) -> Mapping[str, Quantity]:
         return quantities
     pair = quantities[study.trade_off[0]].pair
     asked = {*_named(study), EXPOSURE, *(metric.name for metric in study.user_metrics)}
-    if study.has_swept_tasks:
-        asked |= {name for name, quantity in quantities.items() if quantity.metric.startswith(PREFIX)}
+    asked.update(*study.swept.values())
     return {
         name: quantity
         for name, quantity in quantities.items()
@@ -160,7 +160,6 @@ def rules_of(study: Study) -> Rules:
         front=study.trade_off,
         tolerance=study.tolerance,
         plans=study.plans,
-        vision=section.vision,
         seed=section.seed,
         in_series=frozenset(beyond - leading if section.columns == "asked" else ()),
         asked=_in_every_scene(study),

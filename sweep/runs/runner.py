@@ -16,7 +16,9 @@ import pyarrow as pa
 from ..base.disk import read_facts
 from ..base.errors import InfeasibleError, StudyError, UpperBoundExceededError
 from ..base.types import IndexArray, Int, Progress
+from ..camera.curve_errors import UNCLIPPED
 from ..designs.plugin import PluginFamily
+from ..features import gathered
 from ..results.answers import Answers
 from ..results.dataset import part_name
 from ..results.dictionary import described
@@ -30,8 +32,6 @@ from ..results.tables import (
     COMBINATIONS,
     DESIGNS,
     FRONT,
-    LEFT_OUT,
-    MAP,
     ON_FRONT,
     PARETO,
     PROVENANCE,
@@ -40,7 +40,6 @@ from ..results.tables import (
     SEARCHED,
     SWEPT,
     TILES,
-    VISION_TABLES,
     json_of,
     read_table,
     word_mask,
@@ -50,11 +49,11 @@ from ..search.problem import CONVERGED
 from ..search.upper_bound import UpperBound
 from ..study import Study
 from ..study.goals import refuse_unreachable
+from .analysis import Shown
 from .check import check_run
-from .derived import DerivedInput, row_tables
+from .derived import row_tables
 from .details import design_details
 from .dry_run import seconds_of_effects
-from .held_out import left_out_table
 from .kept import CachedCalls
 from .provenance import plan_facts, provenance, resolved_yaml
 from .rows import parts_of
@@ -64,14 +63,12 @@ from .search import (
     combinations_table,
     front_table,
     limit_alone,
-    map_table,
     run_search,
     search_facts,
     search_log,
 )
 from .sweep import Planned, RunOptions, Sweep
 from .tiles import TileAnswer, run_tile_search, tile_facts, tile_front_table, tiles_table
-from .uncertainty import UNCLIPPED
 from .workers import Workers, stopped_by_signals, workers
 
 if TYPE_CHECKING:
@@ -85,8 +82,7 @@ _CHECK_S, _CHECK_SHARE = 0.5, 0.05
 
 def files_of(study: Study) -> set[str]:
     """Return the names of the files that a run makes."""
-    of_vision = VISION_TABLES if study.section.vision is not None else ()
-    return {RESOLVED, *_whole(study), *row_tables(study), *of_vision}
+    return {RESOLVED, *_whole(study), *row_tables(study)}
 
 
 def _whole(study: Study) -> set[str]:
@@ -96,8 +92,6 @@ def _whole(study: Study) -> set[str]:
     if study.search is not None:
         names |= {SEARCH_LOG, part_name(len(parts))} | ({FRONT} if study.search.levels else set())
         names |= {TILES} if study.search.tiles else set()
-        names |= {LEFT_OUT} if study.leaves_one_out else set()
-        names |= {MAP} if study.search.map else set()
         names |= {COMBINATIONS} if len(numbers_of(study.problem(study.search))) > 1 else set()
     return names
 
@@ -105,7 +99,8 @@ def _whole(study: Study) -> set[str]:
 def usual_backend(study: Study) -> str:
     """Return threads for so few designs that processes would take longer to start, else processes."""
     section, scenes = study.section, study.scenarios.values()
-    slow = study.search is not None or study.states or section.vision is not None or section.population is not None
+    slow = study.search is not None or study.states or section.population is not None
+    slow = slow or any(feature.slow for feature in study.features.values())
     many = study.n_designs > _FEW or len(scenes) > 1 or any(scene.target is not None for scene in scenes)
     own_families = any(space.filter and isinstance(space.filter.family, PluginFamily) for space in study.spaces)
     user_code = section.metrics or section.effects or own_families
@@ -139,6 +134,7 @@ def run_study(
     refuse_unreachable(study)
     with stopped_by_signals(), locked(output):
         manifest = begin(output, run_facts(study))
+        manifest.remove(manifest.wrong(manifest.files.keys() & gathered("ADDED").keys()))
         wrong = set(manifest.wrong(files_of(study)))
         facts = read_facts(manifest.path(PROVENANCE))
         if missing_keys(Provenance, facts) or (options.retry_failed and facts["failed"]):
@@ -193,8 +189,6 @@ class _Run:
             self._search_and_sweep()
         if wrong & row_tables(study).keys():
             self._write_row_tables(wrong)
-        if wrong.intersection(VISION_TABLES):
-            self._write_vision()
         self.manifest.write({RESOLVED: resolved_yaml(study).encode("utf-8")})
         if PROVENANCE in wrong:
             facts = self._provenance().model_dump(mode="json")
@@ -240,8 +234,6 @@ class _Run:
         self._write(PARETO, all_columns.filter(all_columns[ON_FRONT]))
         if answer is not None:
             self._write(SEARCH_LOG, search_log(answer))
-            if answer.search.map:
-                self._write(MAP, map_table(self.study, answer.search, self._kept("map"), self.progress))
             if answer.choice is not None:
                 self._write(COMBINATIONS, combinations_table(self.study, answer))
             if self.over_tiles is not None:
@@ -249,11 +241,6 @@ class _Run:
             if answer.search.levels:
                 found = self.over_tiles
                 self._write(FRONT, front_table(self.study, answer) if found is None else tile_front_table(found))
-            if self.study.leaves_one_out:
-                cached_calls = self._kept("left out")
-                self._write(
-                    LEFT_OUT, left_out_table(self.study, answer.search, answer.best, cached_calls, self.progress)
-                )
 
     @cached_property
     def shown(self) -> pa.Table:
@@ -270,19 +257,10 @@ class _Run:
         details = design_details(self.study, names, rows, on_front, self.pool, self.progress)
         swept = word_mask(self.shown, "kind", SWEPT) & word_mask(self.shown, "status", "ok")
         points = self.shown["design_id"].to_numpy()[swept]
-        shown = DerivedInput(
-            self.study, rows, on_front, details, points, self._limit, self.pool, self._kept, self.progress
-        )
-        for name, make in row_tables(self.study).items():
+        shown = Shown(self.study, rows, on_front, details, points, self._limit, self.pool, self._kept, self.progress)
+        for name, table in row_tables(self.study).items():
             if name in names:
-                self._write(name, make(shown))
-
-    def _write_vision(self) -> None:
-        from .vision import vision_tables  # noqa: PLC0415  (only where a study asks for images)
-
-        tables = vision_tables(self.study, self._frame(best_rows), self._kept("vision"), self.progress)
-        for name, table in tables.items():
-            self._write(name, table)
+                self._write(name, table.make(shown))
 
     def _write(self, name: str, table: pa.Table) -> None:
         """Write a table with `filter_id` beside `design_id`, and with units and meanings."""

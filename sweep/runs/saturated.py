@@ -10,8 +10,9 @@ import pyarrow as pa
 from ..base.types import DesignCurves, delayed
 from ..camera.model import scene_model
 from ..camera.setup import Setup
+from ..results.tables import SATURATED
 from ..study import Study
-from .analysis import Analysis, Calls, named_designs
+from .analysis import Calls, named_designs, table_of_calls
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,4 +33,4 @@ def _full_signals(setup: Setup, curves: DesignCurves) -> list[dict[str, int]]:
     return [{"full_signals": int(full.sum()), "signals": full.size}]
 
 
-SATURATION = Analysis("signals that fill a pixel", lambda _: True, lambda _: _SCHEMA, _calls)
+SATURATION = table_of_calls(SATURATED, "signals that fill a pixel", lambda _: True, lambda _: _SCHEMA, _calls)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import islice, product
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,6 @@ from ..metrics.columns.sensitivity import cfa_sensitivity_at
 from ..results.tables import front_schema, search_schema
 from ..search.certificate import ROUNDING
 from ..search.combinations import Choice, choose, numbers_of, with_members
-from ..search.held import search_cells
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from ..search.solver import extreme_value, refinement_of, search_from, smooth_objective
 from ..search.trade_off import Effort, FrontPoint, calls_at_levels, check_proof, gap_of, trade_off
@@ -32,7 +31,6 @@ from .routes import Rules
 from .rows import Rows, rows_of
 
 _CM_PER_UM = 1e-4
-_CELLS_AT_ONCE = 16
 _REACH_STARTS = 8
 _MOST_CUTS, _CUT = 8, 1e-3
 """Times that scenes are added between those of a series, and by how much an answer must be worse there, relative."""
@@ -312,33 +310,6 @@ def search_log(answer: SearchAnswer) -> pa.Table:
         for index, e in enumerate(run.log)
     ]
     return pa.Table.from_pylist(rows, schema=search_schema(names))
-
-
-def map_table(study: Study, search: Search, parallel: Parallel, progress: Progress) -> pa.Table:
-    """Return the best objective over the values of two parameters, with all other parameters free.
-
-    Returns one row per pair of values: all parameters, objective and sensitivity before clipping and quantization.
-    """
-    problem, names = study.problem(search), search.space.parameters
-    indices = [names.index(name) for name in search.map]
-    assumed = None if study.section.colorants is None else study.section.colorants.assumed
-    cells = [dict(zip(indices, values, strict=True)) for values in product(*search.map.values())]
-    most = min(_MOST_HELD, search.max_evaluations)
-    parts = [cells[at : at + _CELLS_AT_ONCE] for at in range(0, len(cells), _CELLS_AT_ONCE)]
-    calls = [delayed(search_cells, problem, part, search.algorithm, most, study.section.seed) for part in parts]
-    rows = []
-    for evaluations in parallel(calls):
-        for best in evaluations:
-            row = dict(zip(names, map(float, best.x), strict=True))
-            row |= {"objective": best.objective, "sensitivity": best.sensitivity}
-            if assumed is not None and "absorbance" in row:
-                mol_per_l = row["absorbance"] / (assumed.molar_extinction * THICKNESS_UM * _CM_PER_UM)
-                g_per_l = mol_per_l * assumed.molar_mass_g_per_mol
-                row["mol_per_l"] = mol_per_l
-                row["percent_by_weight"] = 100 * g_per_l / (1000 * assumed.film_density_g_per_cm3)
-            rows.append(row | {"violation": best.violation, "feasible": best.feasible})
-        progress("cells of the map", len(rows), len(cells))
-    return pa.Table.from_pylist(rows)
 
 
 def combinations_table(study: Study, answer: SearchAnswer) -> pa.Table:

@@ -10,12 +10,13 @@ import pyarrow as pa
 
 from ..base.types import DesignCurves, delayed
 from ..camera.model import SceneModel
-from ..metrics.columns.flicker import FALSE_HUE, LAMP_SEEN, MODULATION
 from ..metrics.evaluate import evaluate_some
 from ..metrics.quantity import Quantity
+from ..metrics.registry import METRICS
+from ..results.tables import WORST
 from ..study import Study
 from ..study.axes import series_of
-from .analysis import Analysis, Calls, designs_between
+from .analysis import Calls, designs_between, table_of_calls
 from .between import Between, minima_between, or_nan
 
 if TYPE_CHECKING:
@@ -31,7 +32,8 @@ _SCHEMA = pa.schema(
 
 def refined_quantities(study: Study, key: str) -> list[Quantity]:
     """Return quantities whose worst value over a series is told: of pulses, and what a search of it maximizes."""
-    names = [FALSE_HUE, LAMP_SEEN, MODULATION] if key in _OF_PULSES else []
+    of_pulses = [metric for metric in METRICS if metric.needs == "pulses" and key in _OF_PULSES]
+    names = [quantity.name for metric in of_pulses for quantity in metric.quantities(study.requested)]
     if study.search is not None and len(study.search.scenarios) > 1:
         names += study.objective.weights
     return [study.quantities[name] for name in names if name in study.quantities]
@@ -75,4 +77,4 @@ def _is_asked(study: Study) -> bool:
     return any(refined_quantities(study, key) for _, key in series_of(study.scenarios))
 
 
-WORST_VALUES = Analysis("worst values between scenarios", _is_asked, lambda _: _SCHEMA, _calls)
+WORST_VALUES = table_of_calls(WORST, "worst values between scenarios", _is_asked, lambda _: _SCHEMA, _calls)

@@ -169,7 +169,7 @@ class Model:
         x = problem.from_unit(u)
         simulated = {
             production_error: [
-                SmoothDesign(model, families[production_error], x, free, self._span, members, drawn, problem.vision)
+                SmoothDesign(model, families[production_error], x, free, self._span, members, drawn)
                 for model, families, members, drawn in self._scenes
             ]
             for production_error in self._errors

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -27,10 +27,3 @@ def search_held(problem: Problem, algorithm: str, max_evaluations: int, seed: in
     starts = [np.full(problem.free.size, share) for share in _STARTS]
     runs = [search_from(problem, i, u0, algorithm, max_evaluations, seed) for i, u0 in enumerate(starts)]
     return max((evaluation for run in runs for evaluation in run.log), key=lambda evaluation: evaluation.rank)
-
-
-def search_cells(
-    problem: Problem, cells: Sequence[Mapping[int, float]], algorithm: str, max_evaluations: int, seed: int
-) -> list[Evaluation]:
-    """Search what is free with other parameters held at the values of each cell."""
-    return [search_held(fix_parameters(problem, cell), algorithm, max_evaluations, seed) for cell in cells]

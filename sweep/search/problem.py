@@ -15,11 +15,10 @@ from ..designs.ungridded import sobol_points
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.objective import Objective
-from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Quantity, RequestedQuantities
+from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Quantity, RequestedQuantities, asked_of
 from ..metrics.registry import quantities_of
 from ..metrics.user_metrics import UserMetric
 from ..spectra.lights import Pair
-from ..vision.section import SeededVision
 
 
 @dataclass(frozen=True)
@@ -40,18 +39,20 @@ class Problem:
     states: tuple[str, ...] = ()
     user_metrics: tuple[UserMetric, ...] = ()
     seed: int = 0
-    vision: SeededVision | None = None
     others: tuple[tuple[Setup, Family], ...] = ()
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """Quantities that objective and constraints may name."""
-        tasks = () if self.setup.tasks is None else self.setup.tasks.columns
         requested = RequestedQuantities(
-            self.setup.lights.classes, self.states, edge_shift=True, tasks=tasks, user_metrics=self.user_metrics
+            self.setup.lights.classes,
+            self.states,
+            edge_shift=True,
+            population=self.population,
+            wanted_yield=self.setup.wanted_yield,
+            features=asked_of(self.setup.features),
+            user_metrics=self.user_metrics,
         )
-        wanted_yield, vision = self.setup.wanted_yield, self.vision is not None
-        requested = replace(requested, population=self.population, wanted_yield=wanted_yield, vision=vision)
         return quantities_of(requested)
 
     @property

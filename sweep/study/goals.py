@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,8 +26,6 @@ from .schema import StudySection
 from .sources import Sources
 
 _SLACK = 1e-9
-_MOST_OF_AXIS = 200
-"""Values of one parameter of a map."""
 _MOST_LIGHT = 10.0
 """Light of a modified channel over that of its base that anyone may want; larger bounds are percentages."""
 _LEAST_ERROR = 1e-12
@@ -191,8 +189,7 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
     name += " (search)" if name in others else ""
     starts = 1 if requested.algorithm in ONE_START else requested.starts
     effort = requested.algorithm, starts, requested.max_evaluations
-    held = _map_of(requested.map or {}, space, sources)
-    return Search(name, space, searched[0], tuple(searched), *effort, levels, tiles, held)
+    return Search(name, space, searched[0], tuple(searched), *effort, levels, tiles)
 
 
 def _chosen(
@@ -214,7 +211,7 @@ def _chosen(
     if tiles:
         sources.refuse(*_check_tiles(section, tiles, chosen or ""))
         chosen = tiles[0].name
-    if chosen is not None and chosen in boxes and not _free(boxes[chosen], requested.map or {}):
+    if chosen is not None and chosen in boxes and not free_parameters(boxes[chosen]):
         sources.refuse(Fault(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more"))
     return chosen, tuple(tiles)
 
@@ -222,57 +219,29 @@ def _chosen(
 def _check_tiles(section: StudySection, tiles: Sequence[Space], name: str) -> Iterator[Fault]:
     """Check that a search over tiles is asked for what it has."""
     assert section.search is not None
-    if section.search.map is not None:
-        yield Fault(("search", "map"), "of one tile, and the search is over several", None, "a box with a `cfa`")
     if section.search.algorithm != "SLSQP":
         yield Fault(("search", "algorithm"), "of a search over tiles", section.search.algorithm, "SLSQP")
-    if section.validation is not None and section.validation.leave_one_out:
-        yield Fault(("validate", "leave_one_out"), "of one tile, and the search is over several", name, "a box of one")
     if any(space.filter is not None and isinstance(space.filter.family, ChoosingFamily) for space in tiles):
         yield Fault(("search", "space"), "a search over tiles has no choice from a catalog", name, "another family")
 
 
 def _check_series(section: StudySection) -> Iterator[Fault]:
-    """Check that a search over several scenarios has an objective with a worst one, and neither front nor map."""
+    """Check that a search over several scenarios has an objective with a worst one, and no front."""
     assert section.search is not None
-    for key in ("front", "map"):
-        if getattr(section.search, key) is not None:
-            yield Fault(("search", key), "of one scenario, and the search is over several", None, "one `scenario`")
+    if section.search.front is not None:
+        yield Fault(("search", "front"), "of one scenario, and the search is over several", None, "one `scenario`")
     if not section.objective.rule.smallest:
         problem = f"the worst of several scenarios is not known of a {section.objective.rule.name}"
         yield Fault(("objective",), problem, None, "`minimum` or `least`")
 
 
-def _free(space: Space, held: Iterable[str]) -> list[str]:
-    """Return the parameters that a search varies: neither fixed, nor held by a map, nor numbers of a catalog."""
+def free_parameters(space: Space) -> list[str]:
+    """Return the parameters that a search varies: neither fixed, nor numbers of a catalog."""
     assert space.filter is not None
     family = space.filter.family
     numbers = [space.parameters[number] for number, _ in family.slots] if isinstance(family, ChoosingFamily) else []
-    fixed = {*held, *numbers}
     ranges = zip(space.parameters, space.axes, strict=True)
-    return [name for name, axis in ranges if name not in fixed and min(axis) < max(axis)]
-
-
-def _map_of(requested: Mapping[str, Axis], space: Space, sources: Sources) -> dict[str, tuple[float, ...]]:
-    """Return the values of a map, checked to be of the search's parameters and inside its box."""
-    assert space.filter is not None
-    ends = dict(zip(space.parameters, ((min(axis), max(axis)) for axis in space.axes), strict=True))
-    chosen = space.filter.family.slots if isinstance(space.filter.family, ChoosingFamily) else ()
-    values = {}
-    for name, axis in requested.items():
-        path: KeyPath = ("search", "map", name)
-        if name not in ends:
-            sources.refuse(unknown(path, "parameter", name, ends))
-        elif chosen:
-            sources.refuse(Fault(path, "a map has no choice from a catalog", space.name, "a box of another family"))
-        elif axis.size > _MOST_OF_AXIS:
-            sources.refuse(Fault(path, "too many values", axis.size, f"at most {_MOST_OF_AXIS}"))
-        elif min(axis.points()) < ends[name][0] or max(axis.points()) > ends[name][1]:
-            shown = f"{min(axis.points()):g} to {max(axis.points()):g}"
-            sources.refuse(Fault(path, "outside the box", shown, "{:g} to {:g}".format(*ends[name])))
-        else:
-            values[name] = axis.points()
-    return values
+    return [name for name, axis in ranges if name not in numbers and min(axis) < max(axis)]
 
 
 def check_searched(section: StudySection, space: Space, known: Mapping[str, Quantity]) -> Iterator[Fault]:

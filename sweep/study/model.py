@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,23 +17,21 @@ from ..camera.pixel import Pixel
 from ..camera.plan import Plan, plan_scene
 from ..camera.scene import Geometry, Scene
 from ..camera.sensor import SensorCurves
-from ..camera.setup import Setup
+from ..camera.setup import Feature, Setup
 from ..camera.user_effects import UserEffect
 from ..designs.space import Space
 from ..designs.technology import Technology
 from ..designs.tolerance import Tolerance
+from ..features import parts
 from ..metrics.bound import Bound
-from ..metrics.columns.tasks import PREFIX
 from ..metrics.objective import Objective, columns_of
-from ..metrics.quantity import DN, UPPER_BOUND, Column, Quantity, RequestedQuantities
+from ..metrics.quantity import DN, UPPER_BOUND, Column, Quantity, RequestedQuantities, asked_of
 from ..metrics.separation import csd_name
 from ..metrics.user_metrics import UserMetric
 from ..search.problem import Problem
 from ..spectra.colorants import Colorants
 from ..spectra.lights import Lights, Pair, class_pairs, in_order
 from ..spectra.spectrum import WavelengthGrid
-from ..spectra.tasks import StudyTasks
-from ..vision.section import SeededVision
 from .schema import StudySection
 
 
@@ -54,7 +52,6 @@ class Search:
     max_evaluations: int
     levels: tuple[float, ...] = ()
     tiles: tuple[Space, ...] = ()
-    map: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
     def searched(self) -> tuple[Space, ...]:
@@ -81,7 +78,7 @@ class Study:
     search: Search | None
     digests: Mapping[str, str]
     warnings: tuple[str, ...]
-    tasks: StudyTasks | None = None
+    features: Mapping[str, Feature] = field(default_factory=dict)
     user_metrics: tuple[UserMetric, ...] = ()
     user_effects: tuple[UserEffect, ...] = ()
     colorants: Colorants | None = None
@@ -98,12 +95,6 @@ class Study:
         return class_pairs(self.lights.classes)
 
     @property
-    def leaves_one_out(self) -> bool:
-        """Return whether each light is left out of a search in turn."""
-        requested = self.section.validation
-        return requested is not None and requested.leave_one_out and self.search is not None
-
-    @property
     def tolerance(self) -> Tolerance:
         """Production tolerance of filters."""
         return self.section.production.tolerance
@@ -116,7 +107,7 @@ class Study:
     @property
     def requested(self) -> RequestedQuantities:
         """Quantities that the study asks for of its designs."""
-        quantities = requested_quantities(self.section, self.lights, self.tasks, self.user_metrics)
+        quantities = requested_quantities(self.section, self.lights, self.features, self.user_metrics)
         return replace(quantities, any_place=self.any_place, brightest=self.sensor.brightest)
 
     @property
@@ -175,17 +166,16 @@ class Study:
         """Return the setup shared by the designs of a space."""
         bases = {} if space.filter is None else space.filter.bases
         technology = None if space.filter is None else space.filter.technology
-        with_tasks = space.kind != "sweep" or self.has_swept_tasks
-        return self.setup_of(space.cfa, scenario, bases, technology, with_tasks=with_tasks)
+        return self.setup_of(space.cfa, scenario, bases, technology, swept=space.kind == "sweep")
 
     @property
-    def has_swept_tasks(self) -> bool:
-        """True if the columns of tasks are computed for swept designs, too."""
-        tasks = self.section.tasks
-        named = {*self.objective.weights, *self.constraints}
-        return tasks is not None and (
-            tasks.swept or any(self.quantities[name].metric.startswith(PREFIX) for name in named)
-        )
+    def swept(self) -> Mapping[str, frozenset[str]]:
+        """Features that are computed for swept designs, too, with the columns that are asked of them."""
+        hooks: dict[str, Callable[[Study], frozenset[str] | None]] = {
+            name: getattr(module, "swept", lambda _: frozenset()) for name, module in parts("section").items()
+        }
+        columns = {name: hooks[name](self) for name in self.features}
+        return {name: of for name, of in columns.items() if of is not None}
 
     def setup_of(
         self,
@@ -194,15 +184,15 @@ class Study:
         bases: Mapping[str, str],
         technology: Technology | None = None,
         *,
-        with_tasks: bool = True,
+        swept: bool = False,
     ) -> Setup:
         """Return the setup of a CFA, the same one each time, which owns its model.
 
         `bases`: modified channel -> curve that it replaces.
         """
-        key = cfa, scenario, *bases.items(), technology, with_tasks
+        key = cfa, scenario, *bases.items(), technology, swept
         if key not in self._setups:
-            self._setups[key] = self._setup(cfa, scenario, bases, technology, self.tasks if with_tasks else None)
+            self._setups[key] = self._setup(cfa, scenario, bases, technology, swept=swept)
         return self._setups[key]
 
     def _setup(
@@ -211,7 +201,8 @@ class Study:
         scenario: str,
         bases: Mapping[str, str],
         technology: Technology | None,
-        tasks: StudyTasks | None,
+        *,
+        swept: bool,
     ) -> Setup:
         mosaic, scene = self.mosaics[cfa], self.scenarios[scenario]
         replaced = {**self.section.cfas[cfa].curves, **bases}
@@ -234,7 +225,7 @@ class Study:
             camera,
             self.lights,
             scene,
-            tasks=tasks,
+            features={name: of for name, of in self.features.items() if not swept or name in self.swept},
             accuracy=self.section.accuracy,
             user_effects=self.user_effects,
             left_out=self.plans[scenario].left_out if scenario in self.plans else frozenset(),
@@ -293,30 +284,21 @@ class Study:
             states=self.states,
             user_metrics=self.user_metrics,
             seed=self.section.seed,
-            vision=self.images,
             others=tuple((self.setup(search.space, name), search.space.filter.family) for name in search.scenarios[1:]),
         )
 
-    @property
-    def images(self) -> SeededVision | None:
-        """The benchmark of vision, where the study asks for one."""
-        vision = self.section.vision
-        return None if vision is None else SeededVision(vision, self.section.seed)
-
 
 def requested_quantities(
-    section: StudySection, lights: Lights, tasks: StudyTasks | None, user_metrics: tuple[UserMetric, ...]
+    section: StudySection, lights: Lights, features: Mapping[str, Feature], user_metrics: tuple[UserMetric, ...]
 ) -> RequestedQuantities:
-    """Return the quantities that a study computes, as far as its lights and tasks determine them."""
+    """Return the quantities that a study computes, as far as its lights and features determine them."""
     return RequestedQuantities(
         lights.classes,
         _states(section, lights),
         edge_shift=bool(section.production.tolerance),
         population=section.population is not None,
         wanted_yield=section.wanted_yield,
-        tasks=() if tasks is None else tasks.columns,
-        vision=section.vision is not None,
-        flicker=bool(section.pixel.captures) and any(scene.drive is not None for scene in section.scenarios.values()),
+        features=asked_of(features),
         user_metrics=user_metrics,
     )
 

@@ -8,6 +8,7 @@ from typing import TypeVar
 from ..base.errors import Fault, StudyError, SweepError, faults_of
 from ..camera.mosaic import Mosaic
 from ..designs.space import Space
+from ..features import parts
 from ..metrics.quantity import RequestedQuantities
 from ..metrics.registry import quantities_of
 from ..metrics.user_metrics import UserMetric
@@ -48,11 +49,9 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         sensor = with_technologies(sensor, section, sources)
     if lights is not None:
         lights = with_population(lights, section, sources)
-    tasks, spaces, colorants = None, [], None
-    if section.tasks is not None:
-        from .tasks import check_tasks_in_scenes, tasks_of  # noqa: PLC0415  (few studies have tasks)
-
-        tasks = tasks_of(section.tasks, sources)
+    spaces, colorants, before = list[Space](), None, len(sources.issues)
+    made = {name: of.made(section, sources) for name, of in parts("section").items() if hasattr(of, "made")}
+    features, are_known = {name: of for name, of in made.items() if of is not None}, len(sources.issues) == before
     metrics = attempt(lambda: user_metrics(section, sources))
     effects = attempt(lambda: user_effects(section, sources))
     sources.refuse(*check_cfas(section))
@@ -63,15 +62,16 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         if section.uncertainty is not None and section.uncertainty.ir_cut_nm and sensor.ir_cut is None:
             note = f"{sensor.name}: no IR cut is known apart, and `uncertainty.ir_cut_nm` has no effect"
             sources.warnings.append(note)
-        if tasks is not None:
-            sources.refuse(*check_tasks_in_scenes(tasks, section, sensor, spaces))
     sources.refuse(*checks.check_scenes(section))
     search = search_of(section, spaces, sources)
     if lights is not None:
-        requested = requested_quantities(section, lights, tasks, metrics or ())
+        requested = requested_quantities(section, lights, features, metrics or ())
         section = with_pairs_in_order(section, requested)
         sources.refuse(*checks.check_lights(section, lights, mosaics, requested), *check_luminances(section, lights))
-        if metrics is not None and (tasks is not None or section.tasks is None):
+        sources.refuse(
+            *checks.check_features(checks.Checked(section, lights, mosaics, search, sensor, spaces, features))
+        )
+        if metrics is not None and are_known:
             sources.refuse(*_goal_faults(section, metrics, requested, spaces, search, sources))
     if sources.issues or sensor is None or lights is None:
         raise sources.error
@@ -91,7 +91,7 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         search=search,
         digests=dict(sources.digests),
         warnings=tuple(sources.warnings),
-        tasks=tasks,
+        features=features,
         user_metrics=metrics or (),
         user_effects=effects or (),
         colorants=colorants,

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..base.types import Number, Section
+from ..base.types import Number, Section, with_keys_of_features
 from ..camera.accuracy import STANDARD, AccuracySection
 from ..camera.captures import CaptureNames
 from ..camera.curve_errors import CurveErrors
@@ -21,9 +21,7 @@ from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..spectra.population import Population, stated_yield
-from ..spectra.single_leds import RegionMap
 from ..spectra.spectrum import WavelengthGrid
-from ..vision.section import Vision
 from .axes import ScenarioTemplate, Span, Values, expanded
 from .cameras import CameraName, with_camera
 from .schema_curves import (
@@ -32,8 +30,6 @@ from .schema_curves import (
     LightsSection,
     Name,
     SensorSection,
-    TasksAsked,
-    Validation,
     builtin,
     catalog,
     listed,
@@ -211,6 +207,7 @@ class Levels(Section):
         return self
 
 
+@with_keys_of_features
 class SearchSection(Section):
     """Search in a box, or in that of a sweep (from the smallest to the largest value of each parameter)."""
 
@@ -221,8 +218,6 @@ class SearchSection(Section):
     front: Levels | None = None
     """Levels of the lowest allowed sensitivity at which the search is repeated for the trade-off; over `tiles` levels
     of the CFA sensitivity, the light of the whole tile."""
-    map: Annotated[dict[Name, Values], Field(min_length=2, max_length=2)] | None = None
-    """Two parameters and their values: the best objective at each pair of values, with all others free."""
     scenario: Name | None = None
     """Scenario of the search, or one with `each`, of whose scenarios the worst counts; may be left out where there is
     one."""
@@ -253,6 +248,7 @@ def _default_objective(scenarios: Mapping[str, Scene]) -> Objective:
     return Objective(minimum={"csd_yellow_red" if equal else "chromatic_csd_yellow_red": 1.0})
 
 
+@with_keys_of_features
 class StudySection(Section):
     """A whole study file: YAML 1.2 in UTF-8, without tags.
 
@@ -338,14 +334,8 @@ class StudySection(Section):
     """The lamps that the lights stand for: temperature, binning, ageing; then worst_csd_... quantities exist."""
     uncertainty: CurveErrors | None = None
     """Errors of the sensor's curves: separations on random sensors, as quantiles."""
-    regions: RegionMap | None = None
-    """Map of the yellow and red lamps that a norm allows and each CFA separates."""
     recognition: Recognition | None = None
     """How often noise confuses signal types; needs noise in every scenario."""
-    tasks: TasksAsked = None
-    """Further tasks of the camera: `all`, a list of tasks of the package, or a mapping with own ones."""
-    vision: Vision | None = None
-    """Images of signal heads, read by the ideal observer and by a reader that learns; lamps need luminous intensity."""
     metrics: Annotated[
         list[Name], BeforeValidator(listed, json_schema_input_type=list[Name] | Name), Field(max_length=_MOST_OWN)
     ] = []
@@ -360,10 +350,6 @@ class StudySection(Section):
     """Quantity -> {min: ...}, {max: ...} or both."""
     search: SearchSection | None = None
     """A constrained search beside the sweep."""
-    validation: Annotated[Validation | None, Field(alias="validate")] = None
-    """How designs do on lights that they have not seen."""
-    published: dict[Name, dict[Name, dict[Name, Number]]] = {}
-    """Printed figures to compare with: table -> CFA, design or geometry -> quantity -> value."""
     clouds: dict[Name, Annotated[list[Name], Field(min_length=2, max_length=2)]] = {}
     """CFAs whose digital numbers of all lamps the report draws: CFA -> two of its channels."""
 

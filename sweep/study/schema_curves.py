@@ -1,30 +1,22 @@
-"""Sections of a study that name curves: a sensor's, lights' and tasks', built in or from files."""
+"""Sections of a study that name curves: a sensor's and lights', built in or from files."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from ..base.types import Ratio, Seconds, Section
-from ..camera.captures import ReadNoise
+from ..base.types import Ratio, Section
 from ..designs.technology import Stated
 from ..spectra.builtin.registry import BUILT_IN_LIGHTS
 from ..spectra.read_table import MOST_CURVES
 from ..spectra.spectrum import Outside, Resampling
-from ..spectra.tasks import SHIPPED
 from ..spectra.units import SensorQuantity
-
-_MOST_TASKS = 20
-_MOST_CLASSES = 40
 
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 FileColumns = Annotated[list[Name], Field(min_length=1, max_length=MOST_CURVES)]
-_Path = Annotated[str, Field(min_length=1, max_length=4096)]
-FilePath = Annotated[
-    _Path, Field(description="Path of a file of curves, relative to the study or to the folder of --data.")
-]
+FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
 ResamplingRule = Annotated[
     Resampling,
     Field(description="`mean` over each bin keeps the integral of lines that are finer than the grid."),
@@ -32,13 +24,20 @@ ResamplingRule = Annotated[
 OutsideRule = Annotated[Outside, Field(description="`zero` takes 0 where the samples end inside the grid.")]
 
 
-class CurveFile(Section):
-    """QE curves from one file: `columns` maps the sensor's curve names to the file's column names."""
+class FileEntry(Section):
+    """Entry that names a file of curves."""
 
-    file: _Path
+    file: FilePath
     """Path of a file of curves, relative to the study or to the folder of --data.
 
     At most 40 MB, 2,000 curves, 100,000 samples of each and 2,000,000 values; values are 0 to 1e100."""
+    resampling: ResamplingRule = "linear"
+    outside: OutsideRule = "refuse"
+
+
+class CurveFile(FileEntry):
+    """QE curves from one file: `columns` maps the sensor's curve names to the file's column names."""
+
     columns: Annotated[dict[Name, Name], Field(min_length=1)]
     """Channel of the sensor -> column of the file."""
     quantity: SensorQuantity | None = None
@@ -51,8 +50,6 @@ class CurveFile(Section):
     """A curve of the sensor that the file's values are relative to: they are transmissions, and are multiplied by it.
 
     A built-in curve, or one of a file without `relative_to`."""
-    resampling: ResamplingRule = "linear"
-    outside: OutsideRule = "refuse"
 
 
 class SensorSection(Section):
@@ -69,7 +66,7 @@ class SensorSection(Section):
 
     Left out, it is the built-in sensor's own, or the largest curve, which counts as clear only if it is called C, W,
     clear, white, mono or panchromatic."""
-    ir_cut: _Path | None = None
+    ir_cut: FilePath | None = None
     """File of one curve: the transmission of an IR cut in front of the sensor, which multiplies every curve."""
     technology: dict[Name, Stated] = {}
     """Curve -> `pigment`, or `interference: {effective_index: 1.8}`, whose transmission over the clear curve moves with
@@ -84,28 +81,13 @@ class SensorSection(Section):
         return self
 
 
-class LightFile(Section):
+class LightFile(FileEntry):
     """Lights from one file."""
 
-    file: FilePath
     quantity: Literal["energy", "photons"] | None = None
     """Unit of the file's numbers; left out, what the heads of its columns say, else energy."""
     signals: Annotated[dict[Name, FileColumns], Field(min_length=1)]
     """Signal type -> columns of the file."""
-    resampling: ResamplingRule = "linear"
-    outside: OutsideRule = "refuse"
-
-
-class TaskFile(Section):
-    """Spectra of a task's class from one file. Only their shape counts: all spectra of a task have the same photons."""
-
-    file: FilePath
-    quantity: Literal["energy", "photons", "reflectance"]
-    """Unit of the file's numbers: of lamps `energy` or `photons`, of surfaces `reflectance`, in any unit."""
-    columns: FileColumns | None = None
-    """Columns of the file; left out, all of them."""
-    resampling: ResamplingRule = "linear"
-    outside: OutsideRule = "refuse"
 
 
 class LightsSection(Section):
@@ -148,16 +130,6 @@ LIGHTS_NAME: Any = named(BUILT_IN_LIGHTS)
 """The type of lights that are named alone."""
 
 
-class Validation(Section):
-    """Validation on lights that the search does not use."""
-
-    leave_one_out: bool
-    """Search again without each light in turn: how far does the optimum fall on it?"""
-
-
-_TaskName = Annotated[str, Field(min_length=1, max_length=40, pattern="^[a-z][a-z0-9_]*$")]
-
-
 def listed(value: Any) -> Any:
     """Read a single entry as a list of one."""
     return value if isinstance(value, list) else [value]
@@ -183,7 +155,7 @@ class ColorantsSection(Section):
     """Absorption spectra that filters of the family `mixture` choose from."""
 
     catalog: Annotated[
-        list[_Path], BeforeValidator(listed, json_schema_input_type=list[_Path] | _Path), Field(min_length=1)
+        list[FilePath], BeforeValidator(listed, json_schema_input_type=list[FilePath] | FilePath), Field(min_length=1)
     ]
     """`modeled`, the built-in catalog of modeled bands, which no dye has; `films`, nine measured films; or files, or
     folders of files, of curves."""
@@ -191,67 +163,3 @@ class ColorantsSection(Section):
     """Quantity of the files; of molar extinctions, l/(mol cm), the results have concentrations in mol/l."""
     assumed: ColorantMass | None = None
     """A colorant as a map assumes it: then the map has mol/l and percent by weight, too."""
-
-
-_Spectra = Annotated[
-    Annotated[Name, Tag("<group>")] | Annotated[TaskFile, Tag("<file>")],
-    Discriminator(lambda value: "<group>" if isinstance(value, str) else "<file>"),
-]
-_ClassSpectra = Annotated[
-    list[_Spectra],
-    BeforeValidator(listed, json_schema_input_type=list[_Spectra] | _Spectra),
-    Field(min_length=1, max_length=_MOST_CLASSES),
-]
-
-
-class UserTask(Section):
-    """Classes of spectra to separate: from the groups that `sweep list data` shows, and from files."""
-
-    classes: Annotated[dict[Name, _ClassSpectra], Field(min_length=2, max_length=_MOST_CLASSES)]
-    """Class -> a group of spectra, {file: ..., quantity: ...}, or a list of these; all are lamps, or all surfaces."""
-    under: Annotated[list[Name], BeforeValidator(listed, json_schema_input_type=list[Name] | Name)] = []
-    """Lights of a task of surfaces: d65, d50, a (a filament), led, hps, lps (sodium of high and low pressure)."""
-
-
-class TasksSection(Section):
-    """Further tasks of the camera: patches that fill the field, on axis, at one exposure for all CFAs.
-
-    The noise is that of photons and of read noise, in four pixels of the CFA.
-    """
-
-    shipped: Annotated[list[Name], Field(json_schema_extra={"items": {"enum": list(SHIPPED)}})] = list(SHIPPED)
-    """Tasks of the package: color, low_light, vehicle_lamps, emergency, road_marking, traffic_signs, vegetation,
-    unseen_lamps; all of them where it is left out."""
-    own: Annotated[dict[_TaskName, UserTask], Field(max_length=_MOST_TASKS)] = {}
-    """Tasks of your own, by name."""
-    exposure_s: Seconds = 0.01
-    """Exposure, the same for every CFA."""
-    read_noise_e: ReadNoise = 2.0
-    """Read noise of a pixel, electrons."""
-    illuminance_lx: Annotated[float, Field(ge=1e-9, le=1e9)] = 1000.0
-    """Light on the charts of `color`; the color matrix of `low_light`, too, weighs the noise of that light."""
-    swept: bool = False
-    """Compute the tasks for swept designs, too, which takes about 1 ms for each; otherwise only for plain CFAs, named
-    designs and the answer of the search, unless objective or constraints name a task."""
-
-    @model_validator(mode="after")
-    def _some(self) -> TasksSection:
-        if not self.shipped and not self.own:
-            raise ValueError("`shipped`, `own`, or both")
-        if len(set(self.shipped)) < len(self.shipped):
-            raise ValueError("a task is named twice")
-        return self
-
-
-def _tasks(value: Any) -> Any:
-    """Take `all` for every task of the package, and a list for those that it names."""
-    if value == "all":
-        return {}
-    return {"shipped": value} if isinstance(value, list) else value
-
-
-TasksAsked = Annotated[
-    TasksSection | None,
-    BeforeValidator(_tasks, json_schema_input_type=Literal["all"] | list[Name] | TasksSection | None),
-]
-"""`tasks` as a study states it."""

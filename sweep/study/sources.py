@@ -21,10 +21,16 @@ from ..spectra.colorants import BUILTIN_COLORANTS, Colorants, read_colorants
 from ..spectra.formats import digest, read_curves
 from ..spectra.lens_files import ChiefRays, read_chief_rays
 from ..spectra.lights import Lights
-from ..spectra.spectrum import Curves, Quantity, WavelengthGrid, integral_between, photons_from_energy
+from ..spectra.spectrum import (
+    Curves,
+    Quantity,
+    WavelengthGrid,
+    integral_between,
+    photons_from_energy,
+)
 from ..spectra.units import Use, used_as
 from .document import Document, KeyPath, by_line
-from .schema_curves import ColorantsSection, CurveFile, LightFile, TaskFile
+from .schema_curves import ColorantsSection, FileEntry
 
 _MOST_VALUES = 10_000_000
 """Most values of the curves of a sensor, or of lights, on the grid: 80 MB."""
@@ -37,19 +43,18 @@ _MISCOUNTED = 0.01
 _Made = TypeVar("_Made", SensorCurves, Lights)
 _Content = TypeVar("_Content", Curves, ChiefRays)
 _Key = TypeVar("_Key")
-_Entry = CurveFile | LightFile | TaskFile
 
 
 @dataclass(frozen=True)
 class KeptSources:
     """Curves of a finished run, on its wavelength grid, which replace those of files.
 
-    QE by name, photon spectra by signal type and name, spectra of tasks by class and name, absorbances of colorants.
+    QE by name, photon spectra by signal type and name, curves of features by owner and name, absorbances of colorants.
     """
 
     sensor: Mapping[str, PerWavelength]
     lights: Mapping[tuple[str, str], PerWavelength]
-    tasks: Mapping[tuple[str, str], PerWavelength] = field(default_factory=dict)
+    features: Mapping[tuple[str, str], PerWavelength] = field(default_factory=dict)
     colorants: Mapping[str, PerWavelength] = field(default_factory=dict)
 
 
@@ -128,9 +133,7 @@ class Sources:
             self.issues.append(issue)
         return inside
 
-    def photons(
-        self, path: KeyPath, curves: Curves | None, column: str, entry: LightFile | TaskFile
-    ) -> PerWavelength | None:
+    def photons(self, path: KeyPath, curves: Curves | None, column: str, entry: FileEntry) -> PerWavelength | None:
         """Return the photon spectrum of a light; warn about photons outside the wavelength grid or between its nodes.
 
         Returns relative photons per nm. None after adding issues.
@@ -164,7 +167,7 @@ class Sources:
             )
         return values
 
-    def column(self, path: KeyPath, curves: Curves | None, column: str, entry: _Entry) -> PerWavelength | None:
+    def column(self, path: KeyPath, curves: Curves | None, column: str, entry: FileEntry) -> PerWavelength | None:
         """Interpolate a column of a file on the study's wavelength grid."""
         if curves is None:
             return None
@@ -187,7 +190,7 @@ class Sources:
             self.refuse(Fault(path, "the run kept no such curve", name))
         return curves.get(name)
 
-    def curves(self, path: KeyPath, entry: _Entry) -> Curves | None:
+    def curves(self, path: KeyPath, entry: FileEntry) -> Curves | None:
         """Read all curves of a file, once per study."""
         if self.stored is not None:
             return None
@@ -204,7 +207,7 @@ class Sources:
     def used(
         self,
         path: KeyPath,
-        entry: _Entry,
+        entry: FileEntry,
         use: Use,
         columns: Iterable[str] | None = None,
         stated: Quantity | None = None,

@@ -29,7 +29,7 @@ from ..camera.setup import Setup
 from ..camera.user_effects import UserEffect
 from ..designs.space import Space
 from ..metrics.quantity import WORST, RequestedQuantities
-from ..metrics.registry import quantities_of
+from ..metrics.registry import every_feature, quantities_of
 from ..metrics.smooth import smooth_response
 from ..metrics.user_metrics import Readings, UserMetric
 from ..spectra.formats import digest
@@ -204,7 +204,7 @@ def check_names(
     widest = replace(
         requested, user_metrics=(), states=requested.classes, any_place=True, edge_shift=True, population=True
     )
-    taken = {*quantities_of(replace(widest, vision=True)), *RESERVED}
+    taken = {*quantities_of(replace(widest, features=every_feature())), *RESERVED}
     taken |= {name for space in spaces for name in space.parameters}
     for metric in user_metrics:
         if metric.name in taken:

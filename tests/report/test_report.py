@@ -41,7 +41,9 @@ def test_clouds_are_the_digital_numbers_of_all_lamps(finished: FinishedFolder) -
     panels = [panel for panel in section.panels if isinstance(panel, Points)]
     channels = [("RGGB", "R", "G"), ("RYYCy", "R", "Y"), ("best stopband", "R", "N")]
     for panel, (name, *pair) in zip(panels, channels, strict=True):
-        points = run.output.points[run.output.points["design_id"] == run.here[name]["design_id"]]
+        points = run.output.tables["points.parquet"][
+            run.output.tables["points.parquet"]["design_id"] == run.here[name]["design_id"]
+        ]
         read = points.set_index(["signal_type", "channel"])["dn"]
         for kind, values in panel.groups.items():
             for channel, of in zip(pair, values, strict=True):

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import OutputError
+from sweep.features.audit.audit import audit
 from sweep.report import make_report, read_output
 from sweep.results.answers import ANSWERS
 from sweep.results.dataset import rows_in
@@ -20,7 +21,6 @@ from sweep.results.lock import LOCK, locked
 from sweep.results.manifest import Manifest
 from sweep.results.tables import RESULTS, is_drawn, is_of_run
 from sweep.runs import output_folder, run_study
-from sweep.runs.audit import audit
 from sweep.runs.status import status
 from sweep.study import Study, load_study
 

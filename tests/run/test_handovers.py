@@ -20,7 +20,7 @@ def test_captures_fill_in_proportion_to_their_light(tmp_path: Path) -> None:
     text = text.replace(scenarios, "    each: {intensity_cd: [1, 100, 10000, 1000000]}\n\n")
     text = text.replace("[RGGB, RCCB, RCCC, RYYCy, RYNCy]", "[RGGB]")
     text = text[: text.index("designs:")] + "objective: csd_yellow_red\n"
-    table = output_of(tmp_path, text).handovers
+    table = output_of(tmp_path, text).tables["handovers.parquet"]
     assert table is not None
     study = load_study(STUDIES / "hdr.yaml")
     pixel = study.setup(study.spaces[0], next(iter(study.scenarios))).camera.pixel

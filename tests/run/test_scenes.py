@@ -7,8 +7,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from sweep.features.audit.audit import audit_rows, sampled
 from sweep.report import make_report
-from sweep.runs.audit import audit_rows, sampled
 from sweep.study import load_study
 
 from ..build import output_of

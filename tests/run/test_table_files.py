@@ -15,7 +15,7 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet as pq
 
-from sweep.runs.score import table_of
+from sweep.features.vision.score import table_of
 
 from ..build import one_line
 from ..watchdog import within

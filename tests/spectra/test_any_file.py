@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import DataError
+from sweep.features.tasks.task_sets import illuminant
 from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
-from sweep.spectra.builtin.task_sets import illuminant
 from sweep.spectra.formats import read_curves
 from sweep.spectra.spectrum import Quantity, WavelengthGrid
 from sweep.spectra.units import Use, unit_of, used_as

@@ -1,1 +1,3 @@
 """Finished runs beside each other."""
+
+PUBLIC = {"compare": "compare"}

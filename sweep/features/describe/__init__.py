@@ -1,1 +1,3 @@
 """What a file of curves holds."""
+
+PUBLIC = {"describe": "describe"}

@@ -1,1 +1,4 @@
 """Filters of finished runs as files."""
+
+NEEDS = ("map",)
+PUBLIC = {"export": "export"}

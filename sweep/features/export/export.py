@@ -11,7 +11,6 @@ import numpy as np
 from ...base.answer import Answer
 from ...base.errors import OutputError, SweepError, ValidationIssue
 from ...base.types import PerWavelength
-from ...report.bands import specification as specification_of
 from ...results.atomic import write_bytes
 from ...results.designs import BEST, channel_curves, check_kept, find_design_row, row_space, study_of
 from ...results.folder import run_folder
@@ -24,6 +23,7 @@ from ...spectra.filter_files import (
     unique_names,
 )
 from ...study import Study, folder_name
+from ..map.bands import specification as specification_of
 
 _ROUNDING = 1e-9
 _MOST_SHOWN = 10

@@ -23,6 +23,7 @@ class SmallestWidths(Metric):
 
     order = 4
     needs = "parameters"
+    of_scene = False
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         return tuple(

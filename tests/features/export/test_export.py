@@ -13,9 +13,9 @@ from scipy.io import loadmat
 
 import sweep
 from sweep.base.errors import OutputError, SweepError
+from sweep.features.audit.audit import audit
 from sweep.features.export.export import export, relative_transmission
 from sweep.results.dataset import part_paths
-from sweep.runs.audit import audit
 from sweep.spectra.filter_files import color_hints, csv_text, unique_names
 from sweep.spectra.formats import read_curves
 from sweep.study import load_study

@@ -1,0 +1,1 @@
+"""Flicker of a pulsed lamp in the captures of an HDR pixel."""

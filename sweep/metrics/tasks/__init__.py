@@ -1,1 +1,0 @@
-"""Tasks beside the traffic lights, as smooth functions of expected electrons."""
