@@ -213,9 +213,9 @@ def without_pictures(patch: pytest.MonkeyPatch) -> None:
     """Pages whose pictures are empty."""
 
     patch.setattr("sweep.report.page.svg", lambda *_: "<svg></svg>")
-    for module in ("page", "sensors"):
+    for module in ("report.page", *(["features.sensors.page"] if "sensors" in FEATURES else [])):
         patch.setattr(
-            f"sweep.report.{module}.pictures_of",
+            f"sweep.{module}.pictures_of",
             lambda panels, name="pareto": {f"{name}.svg": b"svg", f"{name}.png": b"png"} if panels else {},
         )
 

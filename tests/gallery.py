@@ -15,13 +15,13 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 
 from sweep.features.regions.page import deep_reds
+from sweep.features.sensors.page import report_of_sensors
 from sweep.features.vision.page import benchmark_of, ranks_of
 from sweep.features.vision.readers import OBSERVER
 from sweep.report import read_output
 from sweep.report.page import Report, plain, report_of
 from sweep.report.panels import png
 from sweep.report.run import Run
-from sweep.report.sensors import report_of_sensors
 from sweep.report.tables import PROVEN, Table
 from sweep.results.manifest import Manifest
 

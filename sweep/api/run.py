@@ -9,7 +9,6 @@ import sys
 import time
 import webbrowser
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,23 +18,18 @@ from ..base.answer import Answer
 from ..base.errors import (
     ErrorBoundExceededError,
     InfeasibleError,
-    InterruptedRunError,
     OutputError,
     SweepError,
     ValidationIssue,
 )
 from ..base.types import Progress, in_turn, silent
-from ..results.answers import Answers
-from ..results.dataset import encoded_part, part_name
-from ..results.folder import begin, run_folder
-from ..results.identity import run_facts, several_facts
-from ..results.lock import locked
+from ..features import modules
+from ..results.folder import run_folder
+from ..results.identity import run_facts
 from ..results.manifest import Manifest
-from ..results.tables import ALL_SENSORS, MANIFEST, PROVENANCE, REPORT, RESULTS, json_of
-from ..runs.kept import CachedCalls
-from ..runs.runner import discard
+from ..results.tables import MANIFEST, REPORT
 from ..runs.workers import backend_here, workers
-from ..study import SensorAndLights, SensorStudies, Study, folder_name, load_study, sensor_studies_in
+from ..study import SensorAndLights, Study, folder_name, load_study, sensor_studies_in
 from ..study.shipped import study_path
 from .check import Changes
 
@@ -48,7 +42,7 @@ _LONGEST_NAME = 120
 
 
 @dataclass(frozen=True)
-class _How:
+class How:
     """Arguments of `run`, and the time by the monotonic clock at which its user began to wait, s."""
 
     output: Path
@@ -132,7 +126,7 @@ def run(
     if backend not in (None, *runner.BACKENDS):
         allowed = ", ".join(runner.BACKENDS)
         raise SweepError(ValidationIssue("unknown backend", key="--backend", value=backend, allowed=allowed))
-    how = _How(
+    how = How(
         data=None if data is None else Path(data),
         output=Path(output),
         jobs=jobs,
@@ -147,7 +141,7 @@ def run(
         began_s=time.monotonic() if began_s is None else began_s,
     )
     several = sensor_studies_in(path, how.changes)
-    answer = _run_one(how.load(path), how) if several is None else _run_sensors(path, several, how)
+    answer = run_one(how.load(path), how) if several is None else _several().run_several(path, several, how)
     page = Path(answer.facts["folder"], REPORT)
     if opens and page.is_file() and not webbrowser.open(page.absolute().as_uri()):
         note(f"no browser was found for {page}.")
@@ -182,10 +176,10 @@ def show(folder: Path | str) -> Answer:
 
 def run_loaded(study: Study, output: Path, jobs: int | None) -> Answer:
     """Run a study that Python holds."""
-    return _run_one(study, _How(output, time.monotonic(), jobs=jobs, command=("sweep", "from Python")))
+    return run_one(study, How(output, time.monotonic(), jobs=jobs, command=("sweep", "from Python")))
 
 
-def _run_one(study: Study, how: _How, member: SensorAndLights | None = None) -> Answer:
+def run_one(study: Study, how: How, member: SensorAndLights | None = None) -> Answer:
     """Run a study, which may be a member of several, and draw its report."""
     wanted = how.backend or runner.usual_backend(study)
     if (backend := backend_here(wanted)) != wanted:
@@ -209,7 +203,7 @@ def _run_one(study: Study, how: _How, member: SensorAndLights | None = None) -> 
         if not computed:
             how.note(f"{folder} holds this very study, finished; nothing was computed.")
         parallel = pool if computed and backend == "loky" else in_turn
-        answer = _finish(folder, how.began_s, repair=True, parallel=parallel)
+        answer = finish(folder, how.began_s, repair=True, parallel=parallel)
     return replace(answer, facts={"computed": bool(computed), **answer.facts})
 
 
@@ -220,81 +214,6 @@ def changed_name(changes: Mapping[str, Any]) -> str:
     if len(name) > _LONGEST_NAME:
         name = f"{name[:_LONGEST_NAME]}-{hashlib.sha256(stated.encode()).hexdigest()[:8]}"
     return name
-
-
-def _run_sensors(path: Path, several: SensorStudies, how: _How) -> Answer:
-    """Run a study for each of its sensors and light sets, and compare them.
-
-    The problem of the first one that cannot be run is that of all, after all others.
-    """
-    began_s = time.monotonic()
-    studies = {member: how.load(path, member) for member in several.members}  # mistakes before any work
-    known = several_facts(studies)
-    folder, other = runner.output_folder(how.output / folder_name(several.name) / changed_name(how.changes), known)
-    if other is not None:
-        how.note(f"{other}.")
-    answers, failed, lines = dict[SensorAndLights, Answer](), list[SweepError](), list[str]()
-    with runner.stopped_by_signals(), nullcontext() if how.dry_run else locked(folder):
-        manifest = Manifest(folder) if how.dry_run else begin(folder, known)
-        for member in several.members:
-            how.note(f"-- {member.name} --")
-            try:
-                in_folder = replace(how, output=folder, began_s=time.monotonic())
-                answers[member] = _run_one(studies[member], in_folder, member)
-            except InterruptedRunError:
-                raise
-            except SweepError as error:  # the others are run all the same
-                failed.append(error)
-                continue
-            if (problem := answers[member].problem) is not None:
-                failed.append(problem)
-        facts_of = {member: answer.facts for member, answer in answers.items()}
-        if how.dry_run:
-            lines = [f"{member.name}: {line}" for member, answer in answers.items() for line in answer.lines]
-        elif not facts_of:
-            discard(manifest)
-        else:
-            lines = _join(manifest, studies, facts_of, how, began_s=began_s)
-    return Answer(lines, {"folder": str(folder), "runs": [*facts_of.values()]}, failed[0] if failed else None)
-
-
-def _join(
-    manifest: Manifest,
-    studies: Mapping[SensorAndLights, Study],
-    facts_of: Mapping[SensorAndLights, Mapping[str, Any]],
-    how: _How,
-    *,
-    began_s: float,
-) -> list[str]:
-    """Write what several sensors have in common, where it is missing or damaged; return the answer."""
-    from ..report.sensors import SensorRun, report_sensors, rows_of_all  # noqa: PLC0415  (while workers compute)
-    from ..runs.all_sensors import all_sensors_table  # noqa: PLC0415  (few studies have several sensors)
-
-    runs = [SensorRun(member, Path(run_facts["folder"])) for member, run_facts in facts_of.items()]
-    wrong = manifest.wrong([PROVENANCE, *manifest.files.keys() - {REPORT}])
-    if wrong or any(run_facts["computed"] for run_facts in facts_of.values()):
-        manifest.remove([PROVENANCE, *(name for name in manifest.files if name.startswith(f"{RESULTS}/"))])
-        for at, table in enumerate(rows_of_all(runs)):
-            manifest.write({part_name(at): encoded_part(table, "")})
-        if {PROVENANCE, ALL_SENSORS} & wrong.keys():
-            manifest.remove([ALL_SENSORS])
-            answers = Answers(manifest.folder)
-            with workers(how.jobs or os.cpu_count() or 1) as pool:
-                cached_calls = CachedCalls(pool, answers, f"{manifest.fingerprint} all sensors")
-                table = all_sensors_table([*studies.items()], cached_calls, how.progress)
-            if table is not None:
-                manifest.write_table(ALL_SENSORS, table)
-            answers.remove()
-        facts = {
-            "fingerprint": manifest.fingerprint,
-            "runs": manifest.facts["runs"],
-            "command": how.command,
-            "designs": sum(run_facts["designs"] for run_facts in facts_of.values()),
-            "failed": sum(run_facts["failed"] for run_facts in facts_of.values()),
-            "duration_s": round(time.monotonic() - began_s, 3),
-        }
-        manifest.write({PROVENANCE: json_of(facts).encode("utf-8")})
-    return report_sensors(manifest, runs)
 
 
 def report(folder: Path | str, *, began_s: float | None = None) -> Answer:
@@ -317,22 +236,19 @@ def report(folder: Path | str, *, began_s: float | None = None) -> Answer:
     SweepError
         If files are missing or differ from those that the run wrote.
     """
-    from ..report.sensors import report_sensors, runs_in  # noqa: PLC0415  (few studies have several sensors)
-
     folder, began_s = run_folder(folder), time.monotonic() if began_s is None else began_s
     if not Manifest(folder).runs:
-        return _finish(folder, began_s)
-    with locked(folder):
-        runs = runs_in(folder)
-        if not runs:
-            raise OutputError(ValidationIssue("no finished run here", str(folder), allowed="`sweep run` of its study"))
-        answers = [_finish(run.folder, began_s) for run in runs]
-        problem = next((answer.problem for answer in answers if answer.problem is not None), None)
-        lines = report_sensors(Manifest(folder), runs)
-    return Answer(lines, {"folder": str(folder), "runs": [answer.facts for answer in answers]}, problem)
+        return finish(folder, began_s)
+    answer: Answer = _several().report_several(folder, began_s)
+    return answer
 
 
-def _finish(folder: Path, began_s: float, *, repair: bool = False, parallel: Parallel = in_turn) -> Answer:
+def _several() -> Any:
+    """Return the feature of studies of several sensors."""
+    return next(iter(modules("several")))
+
+
+def finish(folder: Path, began_s: float, *, repair: bool = False, parallel: Parallel = in_turn) -> Answer:
     """Draw figures and report of a finished run; a problem if the run's own check failed."""
     from ..report import make_report, read_output, summary_lines  # noqa: PLC0415  (loaded while workers compute)
 

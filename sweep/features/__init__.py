@@ -27,7 +27,9 @@ FEATURES = (
     "map",
     "published",
     "regions",
+    "sensors",
     "tasks",
+    "tiles",
     "vision",
 )
 

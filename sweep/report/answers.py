@@ -50,7 +50,7 @@ def trade_off(run: Run) -> Answer:
     kept = run.value(run.hero, run.asked) if asked is not None and asked.role == "light" else None
     facts = {
         "found": run.found, "others": others, "asked": asked and words_of(asked), "price": price(run, table),
-        "lost": kept and amount(1 - kept, SHARE), "tiles": run.facts.search is not None and bool(run.facts.search.tiles), "beside": [f"{name} {table.cell(name, 'goal').text}" for name in named] if run.goal.extreme
+        "lost": kept and amount(1 - kept, SHARE), "tiles": run.facts.search is not None and bool(run.facts.search.features), "beside": [f"{name} {table.cell(name, 'goal').text}" for name in named] if run.goal.extreme
         else [f"as much as {joined(named)}"] * bool(named),
     }  # fmt: skip
     return Answer("trade_off", Section("Designs", table, panels), facts)

@@ -14,12 +14,11 @@ from ..camera.scene import Scene
 from ..features import gathered, modules
 from ..results.facts import Origin
 from ..results.manifest import Manifest
-from ..results.tables import COUNTED as OF_TILES
-from ..results.tables import POINTS, REFERENCE, SWEPT, TILES, word_mask
+from ..results.tables import POINTS, REFERENCE, SWEPT, word_mask
 from .answers import filters
 from .numbers import SHARE, amount, digits, inward, joined, span
 from .panels import Curves, Map, Panel, Points, Section, axis_over
-from .run import COUNTED, Run, unit_of, words_of
+from .run import Run, unit_of, words_of
 from .tables import Axis, Column, Table
 
 _PARAMETERS = {
@@ -124,31 +123,6 @@ def clouds(run: Run) -> Sections:
         yield Section("What the pixels read", None, tuple(panels))
 
 
-def tiles(run: Run) -> Sections:
-    """Yield the best tile of each level of light, and what none exceeds."""
-    of, search = run.output.tables.get(TILES), run.facts.search
-    if of is None or search is None or not search.tiles:
-        return
-    unit, rows = unit_of(run.output.goal), {}
-    for level, part in of.groupby(of["cfa_sensitivity_min"].fillna(-1.0), sort=True):
-        best = part[part["best"]]
-        if len(best):
-            row = best.iloc[0]
-            edges = [float(row.get(name, np.nan)) for name in ("left_nm", "right_nm")]
-            rows["the study's" if level < 0 else f"{amount(float(level), SHARE, trim=True)} of the light"] = {
-                "tile": f"{row['cfa']}, N of {row['base']}", "light": row["cfa_sensitivity"], "found": row["objective"],
-                "proven": part["upper_bound"].max(), "edges": " and ".join(f"{e:.0f}" for e in edges if np.isfinite(e)),
-                **{name: row[name] for name in OF_TILES if name in row},
-            }  # fmt: skip
-    columns = {
-        "tile": Column("tile"), "light": Column("light", SHARE), "edges": Column("edges / nm"), "found": Column("best found", unit),
-        "proven": Column("no tile exceeds (proven)", unit),
-        **{name: Column(words, "DN", group="as it is read out") for name, words in zip(OF_TILES, COUNTED.values(), strict=True)},
-    }  # fmt: skip
-    counts = joined([f"{count} {status}" for status, count in search.tiles.items() if count])
-    yield Section("Over all tiles", Table.of(by_column(columns, rows), head="at least"), note=f"Tiles: {counts}.")
-
-
 def sensor(run: Run) -> Sections:
     """Yield the sensor's curves over the lamps."""
     nm, curves = run.output.curves.wavelength_nm, run.output.curves.sensor
@@ -163,7 +137,6 @@ def sensor(run: Run) -> Sections:
 SECTIONS: dict[Callable[[Run], Sections], int] = {
     exactness: 10,
     clouds: 50,
-    tiles: 100,
     sensor: 130,
 }
 """Sections of the core with their ranks: lower ones come first."""

@@ -125,12 +125,6 @@ FILES = {
     "clipping and quantization, `violation` and `feasible`",
     files.FRONT: "results of the search at each level of sensitivity, and the upper bound there; between two levels "
     "rows with the bound alone: " + ", ".join(files.front_schema(["<parameters>"]).names),
-    files.TILES: "of a search over tiles, a row for each tile at each level of light (`cfa_sensitivity_min`; null: "
-    "what the study itself needs): `space`, `cfa`, the curve that its modified pixel is made from (`base`), how many "
-    "`kinds` of pixels, its `status` (`searched`; `excluded`: its `upper_bound` is no more than the best that "
-    "was found; `too dark`; `impossible`: no filter meets the constraints), the best filter found in it, and of the "
-    "`best` tile other separations of the same lamps, DN, as they are read out: "
-    + ", ".join(files.tiles_schema(["<parameters>"]).names),
     files.CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     files.POINTS: "points of the clouds: design_id, signal_type, signal, channel, dn",
     files.CROSSINGS: "where scenarios differ in one number: the numbers `at` which a range of a plain CFA, named "
@@ -147,9 +141,6 @@ FILES = {
     "design and answer of the search (`name`), channel and signal type, the number `at` which the median signal "
     "reaches the threshold of each capture (from 1 on), or saturation of the last one; inf: at none of the series, "
     "-inf: at all",
-    files.ALL_SENSORS: "of a study of several sensors, one filter for all of them and one for all but each: "
-    "`designed_on`, space, sensor, lights, `judged` (it was not designed on this one), objective, sensitivities, "
-    "violation, `own_best` (objective of the best filter of this one alone) and parameters",
     files.RESOLVED: "the study with every default written out; a study file itself",
     files.PROVENANCE: "versions, seed, command, machine, plans of the scenes, meanings of the columns",
     files.REPORT: "the report: one file that you can send, without the network",

@@ -105,8 +105,8 @@ class SearchFacts(_Facts):
     `scenario`: of several (`scenarios`) the one in which the answer is worst. `cfa`, `channel`: the searched ones.
     `bounded`: kind and name of the spaces whose feasible filters the limit holds for, in that scenario.
     `refinement`: the algorithm that continued from the best point of all starts; `endings` has its status at the end.
-    `scenes_added`: of a series, between its scenarios, where the worst value was found. `tiles`: of a search over
-    tiles, how many became what; `tiles_limit`: the bound over all.
+    `scenes_added`: of a series, between its scenarios, where the worst value was found. `features`: what features
+    that search say.
     `upper_bound_of_box`: of filters that may exceed the replaced curve where the box does.
     """
 
@@ -135,8 +135,7 @@ class SearchFacts(_Facts):
     combinations: tuple[str, ...] = ()
     refinement: str | None = None
     scenes_added: int = 0
-    tiles: dict[str, int] = {}
-    tiles_limit: float | None = None
+    features: dict[str, Any] = {}
     upper_bound_of_box: bool = False
 
     @property

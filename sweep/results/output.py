@@ -55,7 +55,6 @@ _COLUMNS: dict[str, Sequence[str]] = {
     files.SATURATED: ["design_id", "full_signals", "signals"],
     files.POINTS: ["design_id", "signal_type", "signal", "channel", "dn"],
     files.FRONT: files.front_schema(()).names,
-    files.TILES: files.tiles_schema(()).names,
 }
 """Columns that a report needs of the tables beside the result table."""
 

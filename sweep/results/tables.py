@@ -31,10 +31,7 @@ SEARCH_LOG, FRONT = "search.parquet", "search_front.parquet"
 CURVES, POINTS = "curves.parquet", "points.parquet"
 LIMITED_BY, SATURATED = "limited_by.parquet", "saturated.parquet"
 CROSSINGS, WORST, HANDOVERS = "crossings.parquet", "worst.parquet", "handovers.parquet"
-COMBINATIONS, TILES = "combinations.parquet", "tiles.parquet"
-COUNTED = ("csd", "pixel_csd", "chromatic_csd", "chromatic_pixel_csd")
-"""Metrics of separations beside the objective of a search over tiles: of equal brightness or any, also by pixel."""
-ALL_SENSORS = "all_sensors.parquet"
+COMBINATIONS = "combinations.parquet"
 PROVENANCE = "provenance.json"
 RESOLVED = "study.resolved.yaml"
 MANIFEST = "manifest.json"
@@ -42,7 +39,7 @@ REPORT = "report.html"
 _OF_CORE = frozenset(
     (
         *(DESIGNS, PARETO, SEARCH_LOG, FRONT, CURVES, POINTS, LIMITED_BY, SATURATED, CROSSINGS, WORST, HANDOVERS),
-        *(COMBINATIONS, TILES, ALL_SENSORS, PROVENANCE, RESOLVED),
+        *(COMBINATIONS, PROVENANCE, RESOLVED),
     )
 )
 _DRAWN = re.compile(r"report\.html|(sensors|cfas|pareto)\.(png|svg)|pareto-\d+\.svg")
@@ -142,16 +139,6 @@ def front_schema(parameters: Sequence[str]) -> pa.Schema:
         "gap",
     )
     fields = [pa.field(name, number) for name in (*names, *parameters)] + [pa.field("evaluations", pa.int64())]
-    return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
-
-
-def tiles_schema(parameters: Sequence[str]) -> pa.Schema:
-    """Return the columns of a search over tiles: a row for each tile and level of light."""
-    text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
-    fields = [pa.field("cfa_sensitivity_min", number), *(pa.field(name, text) for name in ("space", "cfa", "base"))]
-    fields += [pa.field("kinds", pa.int32()), pa.field("status", text), pa.field("best", pa.bool_())]
-    names = ("upper_bound", "objective", "sensitivity", "cfa_sensitivity", *parameters, *COUNTED)
-    fields += [pa.field(name, number) for name in names]
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
 import pyarrow as pa
 
 from ..base.types import Array, Call, DesignCurves, Float, IndexArray, Int, Parallel, PerParameter, Progress
@@ -62,7 +63,7 @@ class Shown:
         """Parameters of the search's answer."""
         assert self.study.search is not None
         row = self.rows[self.rows["kind"] == SEARCHED].iloc[0]
-        return row[list(self.study.search.space.parameters)].to_numpy(dtype=float)
+        return np.asarray([row[name] for name in self.study.search.space.parameters], dtype=float)
 
     @property
     def drawn(self) -> list[dict[Any, Any]]:

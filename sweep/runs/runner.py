@@ -18,7 +18,7 @@ from ..base.errors import InfeasibleError, StudyError, UpperBoundExceededError
 from ..base.types import IndexArray, Int, Progress
 from ..camera.curve_errors import UNCLIPPED
 from ..designs.plugin import PluginFamily
-from ..features import gathered
+from ..features import gathered, modules
 from ..results.answers import Answers
 from ..results.dataset import part_name
 from ..results.dictionary import described
@@ -39,7 +39,6 @@ from ..results.tables import (
     SEARCH_LOG,
     SEARCHED,
     SWEPT,
-    TILES,
     json_of,
     read_table,
     word_mask,
@@ -58,6 +57,7 @@ from .kept import CachedCalls
 from .provenance import plan_facts, provenance, resolved_yaml
 from .rows import parts_of
 from .search import (
+    OtherSearch,
     SearchAnswer,
     answer_rows,
     combinations_table,
@@ -68,7 +68,6 @@ from .search import (
     search_log,
 )
 from .sweep import Planned, RunOptions, Sweep
-from .tiles import TileAnswer, run_tile_search, tile_facts, tile_front_table, tiles_table
 from .workers import Workers, stopped_by_signals, workers
 
 if TYPE_CHECKING:
@@ -91,7 +90,7 @@ def _whole(study: Study) -> set[str]:
     names = {DESIGNS, PARETO, PROVENANCE, *(part_name(part.number) for part in parts)}
     if study.search is not None:
         names |= {SEARCH_LOG, part_name(len(parts))} | ({FRONT} if study.search.levels else set())
-        names |= {TILES} if study.search.tiles else set()
+        names |= {name for module in modules("search") if module.asked(study.search) for name in module.TABLES}
         names |= {COMBINATIONS} if len(numbers_of(study.problem(study.search))) > 1 else set()
     return names
 
@@ -177,7 +176,7 @@ class _Run:
         self.rules, self.selection = self.planned.rules, self.planned.selection
         self.sweep = Sweep(self.planned, self.manifest, self.pool)
         self.gathered = Gathered(self.selection, self.rules.wanted_of_swept.schema)
-        self.over_tiles: TileAnswer | None = None
+        self.other: OtherSearch | None = None
 
     def make(self, wrong: set[str]) -> tuple[str, ...]:
         """Make files and those that depend on them; provenance comes last, and marks a finished run."""
@@ -203,11 +202,10 @@ class _Run:
             return None
         cached_calls = self._kept("search")
         try:
-            if self.study.search.tiles:
-                self.over_tiles = run_tile_search(
-                    self.study, self.study.search, self.rules, cached_calls, self.progress
-                )
-                return self.over_tiles.answer
+            for module in modules("search"):
+                if module.asked(self.study.search):
+                    self.other = module.run(self.study, self.study.search, self.rules, cached_calls, self.progress)
+                    return self.other.answer
             return run_search(self.study, self.study.search, self.rules, cached_calls, self.progress)
         except UpperBoundExceededError:
             cached_calls.drop_limits()
@@ -236,11 +234,11 @@ class _Run:
             self._write(SEARCH_LOG, search_log(answer))
             if answer.choice is not None:
                 self._write(COMBINATIONS, combinations_table(self.study, answer))
-            if self.over_tiles is not None:
-                self._write(TILES, tiles_table(self.study, self.over_tiles))
-            if answer.search.levels:
-                found = self.over_tiles
-                self._write(FRONT, front_table(self.study, answer) if found is None else tile_front_table(found))
+            if self.other is not None:
+                for name, table in self.other.tables.items():
+                    self._write(name, table)
+            elif answer.search.levels:
+                self._write(FRONT, front_table(self.study, answer))
 
     @cached_property
     def shown(self) -> pa.Table:
@@ -299,7 +297,7 @@ class _Run:
             warnings.append(UNCLIPPED)
         if answer is not None:
             facts["search"] = search_facts(study, answer)
-            facts["search"] |= {} if self.over_tiles is None else tile_facts(self.over_tiles)
+            facts["search"] |= {} if self.other is None else {"features": self.other.facts}
             if not any(run.status in CONVERGED for run in answer.runs):
                 warnings.append("no start of the search converged: more `max_evaluations` may find a better design")
             noisy = any(study.quantities[name].states for name in study.objective.weights)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
@@ -63,6 +63,15 @@ class SearchAnswer:
     def gap(self) -> float | None:
         """Relative distance of the answer below the proven upper bound."""
         return None if self.upper_bound is None else gap_of(self.best, self.upper_bound)
+
+
+@dataclass(frozen=True)
+class OtherSearch:
+    """Search of a feature in place of `run_search`: its answer, its tables by their files' names, and its facts."""
+
+    answer: SearchAnswer
+    tables: Mapping[str, pa.Table]
+    facts: Mapping[str, Any]
 
 
 def run_search(study: Study, search: Search, rules: Rules, parallel: Parallel, progress: Progress) -> SearchAnswer:

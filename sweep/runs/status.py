@@ -9,14 +9,14 @@ from typing import Any
 from ..base.answer import Answer
 from ..base.disk import read_facts
 from ..base.errors import DamagedRunError
+from ..features import modules
 from ..metrics.share import format_share
 from ..results.answers import Answers
 from ..results.dataset import rows_in
-from ..results.folder import run_folder, run_in
+from ..results.folder import run_folder
 from ..results.lock import in_use
 from ..results.manifest import Manifest, issues_of
 from ..results.tables import PROVENANCE, REPORT, RESULTS
-from ..study import folder_name
 
 
 def status(folder: Path | str, *, verify: bool = False) -> Answer:
@@ -44,9 +44,10 @@ def status(folder: Path | str, *, verify: bool = False) -> Answer:
     manifest.require_run()
     running = in_use(folder)
     if manifest.runs:
-        return _status_of_several(manifest, verify=verify, running=running)
+        of_several: Answer = next(iter(modules("several"))).status_of_several(manifest, verify=verify, running=running)
+        return of_several
     finished = PROVENANCE in manifest.files and not running
-    _require_whole(manifest, verify=verify, running=running)
+    require_whole(manifest, verify=verify, running=running)
     if finished:
         facts = read_facts(folder / PROVENANCE)
         state = "finished"
@@ -65,36 +66,11 @@ def status(folder: Path | str, *, verify: bool = False) -> Answer:
         values = {"designs": total, "finished_designs": done, "parts": parts, "search_answers": answers}
         if parts:
             lines.append(f"Finished parts: {folder / RESULTS}, which pandas.read_parquet reads.")
-    lines += _lines_of_files(manifest, finished=finished, verified=verify and not running)
+    lines += lines_of_files(manifest, finished=finished, verified=verify and not running)
     return Answer(lines, {"folder": str(folder), "state": state, "verified": verify, **values})
 
 
-def _status_of_several(manifest: Manifest, *, verify: bool, running: bool) -> Answer:
-    """Return the state of a study of several sensors or lights: a line for each of them."""
-    folder, lines, states = manifest.folder, [], {}
-    _require_whole(manifest, verify=verify, running=running)
-    for member in manifest.runs:
-        inner = folder / folder_name(member.name)
-        if run_in(inner) is None:
-            states[member.name] = "not run"
-            lines.append(f"{member.name}: not run.")
-            continue
-        of_member = status(inner, verify=verify)
-        states[member.name] = str(of_member.facts["state"])
-        lines.append(f"{member.name}: {of_member.lines[0]}")
-    count = sum(state == "finished" for state in states.values())
-    is_complete = count == len(states) and PROVENANCE in manifest.files
-    state = "running" if running else "finished" if is_complete else "interrupted"
-    lines.append(
-        f"{state}: {count} of {len(states)} runs finished"
-        f"{'' if is_complete or running else '; the same command continues'}."
-    )
-    finished = PROVENANCE in manifest.files
-    lines += _lines_of_files(manifest, finished=finished, verified=verify and not running)
-    return Answer(lines, {"folder": str(folder), "state": state, "verified": verify, "runs": states})
-
-
-def _require_whole(manifest: Manifest, *, verify: bool, running: bool) -> None:
+def require_whole(manifest: Manifest, *, verify: bool, running: bool) -> None:
     """Raise DamagedRunError for files of a finished run that are missing, or that `verify` finds otherwise wrong."""
     finished = PROVENANCE in manifest.files
     if running or not (verify or finished):
@@ -106,7 +82,7 @@ def _require_whole(manifest: Manifest, *, verify: bool, running: bool) -> None:
         raise DamagedRunError(issues_of(manifest.folder, wrong))
 
 
-def _lines_of_files(manifest: Manifest, *, finished: bool, verified: bool) -> list[str]:
+def lines_of_files(manifest: Manifest, *, finished: bool, verified: bool) -> list[str]:
     """Return what there is in the folder, and what does not belong there."""
     lines = list(manifest.notes)
     if finished and REPORT in manifest.files:

@@ -170,8 +170,6 @@ def search_of(section: StudySection, spaces: Sequence[Space], sources: Sources) 
         return None
     if len(searched) > 1:
         sources.refuse(*_check_series(section))
-        if tiles:
-            sources.refuse(Fault(("search", "scenario"), "a search over tiles is in one scenario", None, searched[0]))
     levels: tuple[float, ...] = ()
     if requested.front is not None:
         levels = Axis(min=requested.front.min, max=requested.front.max, count=requested.front.count).points()
@@ -209,20 +207,10 @@ def _chosen(
         sources.refuse(unknown(("search", "space"), "sweep or box", chosen, names))
     tiles = groups.get(chosen or "", []) if chosen not in boxes else []
     if tiles:
-        sources.refuse(*_check_tiles(section, tiles, chosen or ""))
         chosen = tiles[0].name
     if chosen is not None and chosen in boxes and not free_parameters(boxes[chosen]):
         sources.refuse(Fault(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more"))
     return chosen, tuple(tiles)
-
-
-def _check_tiles(section: StudySection, tiles: Sequence[Space], name: str) -> Iterator[Fault]:
-    """Check that a search over tiles is asked for what it has."""
-    assert section.search is not None
-    if section.search.algorithm != "SLSQP":
-        yield Fault(("search", "algorithm"), "of a search over tiles", section.search.algorithm, "SLSQP")
-    if any(space.filter is not None and isinstance(space.filter.family, ChoosingFamily) for space in tiles):
-        yield Fault(("search", "space"), "a search over tiles has no choice from a catalog", name, "another family")
 
 
 def _check_series(section: StudySection) -> Iterator[Fault]:

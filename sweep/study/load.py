@@ -11,12 +11,13 @@ from pydantic import ValidationError
 
 from ..base.disk import is_folder
 from ..base.errors import StudyError, ValidationIssue
+from ..features import modules
 from ..spectra.spectrum import Curves
 from .document import Document
+from .members import SensorAndLights, SensorStudies, of_one_fit
 from .model import Study
 from .resolve import resolve
 from .schema import StudySection
-from .sensor_studies import SensorAndLights, SensorStudies, choose, members_of, narrowed, of_one_fit, way_to_one
 from .sources import KeptSources, Sources
 
 
@@ -37,17 +38,19 @@ def load_study(
     file:line, key, value, allowed values, nearest name.
     """
     document = _changed(path, changes)
-    members = members_of(document)
+    several: Any = next(iter(modules("members")), None)
+    members = _members_of(document)
     if member is None and len(members) > 1:
         names = ", ".join(known_member.name for known_member in members)
         problem = f"a study of several sensors, pixels or lights ({names}): `sweep run` runs all"
         key = next(key for key in ("sensors", "pixels", "lights") if key in document.data)
-        raise StudyError(document.issue((key,), problem, None, f"one of each here: {way_to_one(document)}"))
-    chosen, notes = member or members[0], list[str]()
-    choose(document, chosen)
+        raise StudyError(document.issue((key,), problem, None, f"one of each here: {several.way_to_one(document)}"))
+    chosen, notes = member or next(iter(members), None), list[str]()
+    if chosen is not None:
+        several.choose(document, chosen)
     section = _checked(document)
-    if max(chosen.indices) >= 0 or chosen.pixel:
-        section, notes = narrowed(section, chosen)
+    if chosen is not None and (max(chosen.indices) >= 0 or chosen.pixel):
+        section, notes = several.narrowed(section, chosen)
         if len(members) > 1:
             section = section.model_copy(update={"study": chosen.name})
     if data is not None and not is_folder(data):
@@ -65,9 +68,14 @@ def sensor_studies_in(path: Path, changes: Mapping[str, Any] = {}) -> SensorStud
     YAML, or its lists have no names.
     """
     document = _changed(path, changes)
-    members = members_of(document)
+    members = _members_of(document)
     name = str(document.data.get("study") or path.stem)
     return SensorStudies(name, tuple(members)) if len(members) > 1 else None
+
+
+def _members_of(document: Document) -> list[SensorAndLights]:
+    """Return the sensors and lights of a study, each pair once, where the package has the feature."""
+    return [member for module in modules("members") for member in module.members_of(document)]
 
 
 def _changed(path: Path, changes: Mapping[str, Any]) -> Document:

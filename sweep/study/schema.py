@@ -9,7 +9,6 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..base.types import Number, Section, with_keys_of_features
 from ..camera.accuracy import STANDARD, AccuracySection
-from ..camera.captures import CaptureNames
 from ..camera.curve_errors import CurveErrors
 from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
@@ -18,6 +17,7 @@ from ..camera.sensor import BUILT_IN_SENSORS
 from ..designs.registry import PIGMENTS, FamilyOptions, described_families
 from ..designs.technology import PIGMENT, Stated
 from ..designs.tolerance import Tolerance
+from ..features import modules
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..spectra.population import Population, stated_yield
@@ -35,7 +35,6 @@ from .schema_curves import (
     listed,
     named,
 )
-from .tiles import with_tiles
 
 _MOST_ROWS = 64
 _MOST_LETTERS = 100
@@ -272,15 +271,11 @@ class StudySection(Section):
     ]
     """QE curves: `ar0820`, a built-in surrogate, a measured one (`sweep list data`), a plugin of a package, or a
     mapping with `files`."""
-    sensors: list[named(BUILT_IN_SENSORS) | SensorSection] | None = None  # type: ignore[valid-type]
-    """Several sensors instead of `sensor`: one run for each, and their comparison; `rawtoaces/*` are all that fit."""
     camera: CameraName | None = None
     """Pixel and lens of a camera for the road, where `pixel` and `optics` of the scenarios state nothing else: `road`,
     f/2 and a split pixel of 2.8 um; `road_read_once`, its large photodiode alone, read once."""
     pixel: Pixel = Pixel()
     """The pixel and its readout."""
-    pixels: dict[Name, CaptureNames | Pixel | None] | None = None
-    """Several pixels: one run for each, and their comparison; NAME: keys that differ from `pixel`, or captures."""
     lights: Annotated[
         LightsSection,
         BeforeValidator(
@@ -356,7 +351,10 @@ class StudySection(Section):
     @model_validator(mode="before")
     @classmethod
     def _written_out(cls, value: Any) -> Any:
-        return with_tiles(with_camera(value))
+        value = with_camera(value)
+        for module in modules("written"):
+            value = module.written(value)
+        return value
 
     @property
     def wanted_yield(self) -> float:

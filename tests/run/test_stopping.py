@@ -20,9 +20,9 @@ from sweep.results.answers import ANSWERS
 
 from ..build import STUDY, load, ran
 from ..commanded import commanded
+from ..features.sensors.test_several_folder import SEVERAL
 from ..mischief import assert_same_tables
 from ..warm import Warm
-from .test_several_folder import SEVERAL
 
 SLOWED = Path(__file__).parent.parent / "slowed"
 SAID = "sweep: interrupted; finished parts are kept, the same command continues\n"

@@ -25,7 +25,7 @@ from sweep.search.solver import search_from, smooth_objective
 from sweep.study import Study
 
 from ...build import load, one_line, ran
-from ...run.test_sensors import own_csd, own_draws
+from ..sensors.test_sensors import own_csd, own_draws
 
 PAIR = ("yellow", "red")
 TEXT = """\

@@ -19,9 +19,9 @@ from sweep.spectra.builtin.measured_sets import SENSORS, WIDE
 from sweep.spectra.spectrum import WavelengthGrid
 from sweep.study import load_study, sensor_studies_in
 
-from ..build import load, ran
-from ..commanded import commanded
-from ..conftest import MEASURED, draw_nothing
+from ...build import load, ran
+from ...commanded import commanded
+from ...conftest import MEASURED, draw_nothing
 
 GRID = WavelengthGrid(start_nm=400, stop_nm=664, step_nm=1)
 

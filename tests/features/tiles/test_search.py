@@ -10,17 +10,17 @@ import pandas as pd
 import pytest
 
 from sweep.camera.exposure import may_be_brightest
+from sweep.features.tiles.tiles import EXCLUDED, SEARCHED, Tiles, search_tiles
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.runs import run_study
 from sweep.search.problem import Problem, starting_points
-from sweep.search.tiles import EXCLUDED, SEARCHED, Tiles, search_tiles
 from sweep.search.trade_off import Effort
 from sweep.search.upper_bound import upper_bound_of
 from sweep.study import Study, load_study
 
-from ..build import load
-from .problems import best_of, csd_of
+from ...build import load
+from ...search.problems import best_of, csd_of
 
 TILES = """\
 study: t

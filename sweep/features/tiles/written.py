@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations_with_replacement, product
 from typing import Any
 
-from ..base.errors import Fault, SweepError
-from ..camera.mosaic import Mosaic
+from ...base.errors import Fault, SweepError
+from ...camera.mosaic import Mosaic
 
 TILES = "tiles"
 MODIFIED = "N"
@@ -20,7 +20,7 @@ _SMALL = 4
 _ALLOWED = "{tiles: 2x2, of: [R, G, B, Y, Cy], modified: 1}, or {tiles: [RGGB, RYYCy]}"
 
 
-def with_tiles(value: Any) -> Any:
+def written(value: Any) -> Any:
     """Return the keys of a study with its tiles written out: each a CFA, and a box of each filter in each."""
     cfas = value.get("cfas") if isinstance(value, dict) else None
     if not isinstance(cfas, dict):
@@ -35,11 +35,11 @@ def with_tiles(value: Any) -> Any:
     tiles, named = _tiles_of(value, cfas, modified=bool(modified)), dict(cfas)
     for key in (TILES, _OF, _COUNT):
         named.pop(key, None)
-    written = _boxes_of(value.get("boxes", {}), tiles, modified)
+    boxes = _boxes_of(value.get("boxes", {}), tiles, modified)
     if clash := [cfa for cfa, *_ in tiles if modified and cfa in named]:
         raise Fault(("cfas", clash[0]), "one of the tiles has this name", None, "another name")
     made = {cfa: {"tile": rows} for cfa, rows, _ in tiles if cfa not in named}
-    return value | {"cfas": named | made} | ({"boxes": written} if written else {})
+    return value | {"cfas": named | made} | ({"boxes": boxes} if boxes else {})
 
 
 def _boxes_of(boxes: Any, tiles: Sequence[tuple[str, Any, str]], modified: int) -> dict[str, Any]:

@@ -8,13 +8,13 @@ from typing import Any
 
 import pyarrow as pa
 
-from ..base.types import Parallel, Progress, delayed
-from ..designs.family import ChoosingFamily, Family
-from ..metrics.bound import FEASIBLE
-from ..search.problem import Evaluation, Problem, best_feasible, starting_points
-from ..search.solver import search_from, smooth_evaluation
-from ..study import Search, SensorAndLights, Study
-from .workers import run_with_progress
+from ...base.types import Parallel, Progress, delayed
+from ...designs.family import ChoosingFamily, Family
+from ...metrics.bound import FEASIBLE
+from ...runs.workers import run_with_progress
+from ...search.problem import Evaluation, Problem, best_feasible, starting_points
+from ...search.solver import search_from, smooth_evaluation
+from ...study import Search, SensorAndLights, Study
 
 ALL = "all sensors"
 _STARTS = 8

@@ -4,44 +4,20 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
-from ..base.errors import StudyError, SweepError
-from ..camera.pixel import merged
-from ..camera.sensor import BUILT_IN_SENSORS, own_red
-from ..spectra.builtin.measured_sets import LUXEON, SENSORS
-from .document import Document
-from .schema import Modification, StudySection
+from ...base.errors import StudyError, SweepError
+from ...camera.pixel import merged
+from ...camera.sensor import BUILT_IN_SENSORS, own_red
+from ...spectra.builtin.measured_sets import LUXEON, SENSORS
+from ...study.document import Document
+from ...study.members import SensorAndLights
+from ...study.schema import Modification, StudySection
 
 _MOST = 200
 _SURROGATE_CURVES = ("C", "R", "G", "B", "Y", "Cy", "Rx")
 _MEASURED = {**SENSORS, "luxeon": LUXEON}
 _SPACES = ("cfas", "designs", "sweeps", "boxes")
-
-
-class SensorAndLights(NamedTuple):
-    """One sensor under one set of lights.
-
-    `indices`: their places in the lists of the study; -1 where there is no list. `pixel`: one of several, which is part
-    of the sensor's name.
-    """
-
-    sensor: str
-    lights: str
-    indices: tuple[int, int]
-    pixel: str = ""
-
-    @property
-    def name(self) -> str:
-        """Name of its study, and of the folder of its results."""
-        return f"{self.sensor} {self.lights}"
-
-
-class SensorStudies(NamedTuple):
-    """A study of several sensors, pixels or light sets: its name and its members."""
-
-    name: str
-    members: tuple[SensorAndLights, ...]
 
 
 def members_of(document: Document) -> list[SensorAndLights]:
@@ -124,15 +100,6 @@ def choose(document: Document, member: SensorAndLights) -> None:
         both = general if not isinstance(general, dict) else merged(general, keys) if isinstance(keys, dict) else keys
         document.put("pixel", both, ("pixels", member.pixel))
         document.data.pop("pixels")
-
-
-def of_one_fit(section: StudySection) -> StudySection:
-    """Return the study with lamps of the same fit as its modeled sensor: the figures hold for both together."""
-    _, at, fit = (section.sensor.builtin or "").partition("@")
-    if not fit or section.lights.builtin != "tl16":
-        return section
-    lights = section.lights.model_copy(update={"builtin": f"tl16{at}{fit}"})
-    return section.model_copy(update={"lights": lights})
 
 
 def narrowed(section: StudySection, member: SensorAndLights) -> tuple[StudySection, list[str]]:

@@ -11,14 +11,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..base.types import Array, Float, Parallel, Progress, delayed
-from ..camera.setup import Setup
-from ..metrics.bound import Bound
-from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, cfa_sensitivity_at
-from .problem import Evaluation, Problem
-from .solver import search_from, smooth_evaluation
-from .trade_off import Effort, with_least
-from .upper_bound import check_bound, reason_without_bound, upper_bound_of
+from ...base.types import Array, Float, Parallel, Progress, delayed
+from ...camera.setup import Setup
+from ...metrics.bound import Bound
+from ...metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, cfa_sensitivity_at
+from ...search.problem import Evaluation, Problem
+from ...search.solver import search_from, smooth_evaluation
+from ...search.trade_off import Effort, with_least
+from ...search.upper_bound import check_bound, reason_without_bound, upper_bound_of
 
 _BOUND_DN, _PROGRAMS, _MORE_PROGRAMS = 0.5, 100, 400
 """Width of the bounds, and linear programs for the bound of each tile, and for the highest ones."""

@@ -12,24 +12,25 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ..camera.curve_errors import UNCLIPPED
-from ..metrics.columns.chromatic import CHROMATIC_CSD
-from ..metrics.columns.color_separation import CSD
-from ..metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD, PIXEL_CSD
-from ..results.dataset import part_paths
-from ..results.facts import Origin
-from ..results.manifest import Manifest
-from ..results.output import read_output
-from ..results.tables import ALL_SENSORS, REFERENCE, REPORT, RESULTS, SEARCHED, read_table
-from ..runs.all_sensors import ALL
-from ..spectra.lights import pair_name
-from ..study import SensorAndLights, folder_name
-from .numbers import joined, span
-from .page import Report, filled, pictures_of
-from .panels import INK, Panel, Points, Section, axis_over
-from .run import COUNTED, LIGHT, Run, unit_of, words_of
-from .sections import Pairs, conditions, named
-from .tables import Axis, Column, Marks, Table
+from ...camera.curve_errors import UNCLIPPED
+from ...metrics.columns.chromatic import CHROMATIC_CSD
+from ...metrics.columns.color_separation import CSD
+from ...metrics.columns.pixel_separation import CHROMATIC_PIXEL_CSD, PIXEL_CSD
+from ...report.numbers import joined, span
+from ...report.page import Report, filled, pictures_of
+from ...report.panels import INK, Panel, Points, Section, axis_over
+from ...report.run import COUNTED, LIGHT, Run, unit_of, words_of
+from ...report.sections import Pairs, conditions, named
+from ...report.tables import Axis, Column, Marks, Table
+from ...results.dataset import part_paths
+from ...results.facts import Origin
+from ...results.manifest import Manifest
+from ...results.output import read_output
+from ...results.tables import REFERENCE, REPORT, RESULTS, SEARCHED, read_table
+from ...spectra.lights import pair_name
+from ...study import SensorAndLights, folder_name
+from . import ALL_SENSORS
+from .all_sensors import ALL
 
 PICTURE = "sensors"
 _KEYS = ("sensor", "lights")

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from sweep.features.sensors import ALL_SENSORS
 from sweep.results.dataset import part_name
 from sweep.results.manifest import Manifest
-from sweep.results.tables import ALL_SENSORS, MANIFEST, PROVENANCE, REPORT
+from sweep.results.tables import MANIFEST, PROVENANCE, REPORT
 
-from ..commanded import commanded
-from ..conftest import draw_nothing
+from ...commanded import commanded
+from ...conftest import draw_nothing
 
 SEVERAL = """\
 study: few

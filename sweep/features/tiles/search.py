@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from ..base.errors import InfeasibleError, ValidationIssue
-from ..base.types import Parallel, Progress, delayed
-from ..camera.model import SceneModel
-from ..metrics.evaluate import evaluate_some
-from ..results.tables import COUNTED, front_schema, tiles_schema
-from ..search.problem import Problem, best_feasible, starting_points
-from ..search.solver import search_from
-from ..search.tiles import SEARCHED, Tiles, search_tiles
-from ..search.trade_off import Effort, check_proof
-from ..search.upper_bound import reason_without_bound, upper_bound_of
-from ..spectra.lights import pair_name
-from ..study import Search, Study
-from .as_read import Reading, best_as_read
-from .routes import Rules
-from .search import SearchAnswer
+from ...base.errors import InfeasibleError, ValidationIssue
+from ...base.types import Parallel, Progress, delayed
+from ...camera.model import SceneModel
+from ...metrics.evaluate import evaluate_some
+from ...results.tables import FRONT, SCHEMA_VERSION, front_schema
+from ...runs.as_read import Reading, best_as_read
+from ...runs.routes import Rules
+from ...runs.search import OtherSearch, SearchAnswer
+from ...search.problem import Problem, best_feasible, starting_points
+from ...search.solver import search_from
+from ...search.trade_off import Effort, check_proof
+from ...search.upper_bound import reason_without_bound, upper_bound_of
+from ...spectra.lights import pair_name
+from ...study import Search, Study
+from . import TILES
+from .tiles import SEARCHED, Tiles, search_tiles
+
+COUNTED = ("csd", "pixel_csd", "chromatic_csd", "chromatic_pixel_csd")
+"""Metrics of separations beside the objective of a search over tiles: of equal brightness or any, also by pixel."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,12 @@ class TileAnswer:
     tiles: Tiles
 
 
-def run_tile_search(study: Study, search: Search, rules: Rules, parallel: Parallel, progress: Progress) -> TileAnswer:
+def asked(search: Search) -> bool:
+    """Return whether a search is over tiles."""
+    return bool(search.tiles)
+
+
+def run(study: Study, search: Search, rules: Rules, parallel: Parallel, progress: Progress) -> OtherSearch:
     """Search over tiles, and then from every start in the best one.
 
     Raises InfeasibleError if no tile has a feasible filter. Raises UpperBoundExceededError if a filter exceeds the
@@ -72,7 +82,21 @@ def run_tile_search(study: Study, search: Search, rules: Rules, parallel: Parall
     answer = SearchAnswer(
         of_best, search.scenario, tuple(runs), best, limit, no_upper_bound, front=(), starts=len(starts)
     )
-    return TileAnswer(answer, search, problems, tiles)
+    whole = TileAnswer(answer, search, problems, tiles)
+    tables = {TILES: tiles_table(study, whole)}
+    if search.levels:
+        tables[FRONT] = tile_front_table(whole)
+    return OtherSearch(answer, tables, {"tiles": tile_facts(whole)})
+
+
+def tiles_schema(parameters: Sequence[str]) -> pa.Schema:
+    """Return the columns of a search over tiles: a row for each tile and level of light."""
+    text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
+    fields = [pa.field("cfa_sensitivity_min", number), *(pa.field(name, text) for name in ("space", "cfa", "base"))]
+    fields += [pa.field("kinds", pa.int32()), pa.field("status", text), pa.field("best", pa.bool_())]
+    names = ("upper_bound", "objective", "sensitivity", "cfa_sensitivity", *parameters, *COUNTED)
+    fields += [pa.field(name, number) for name in names]
+    return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
 
 def tiles_table(study: Study, found: TileAnswer) -> pa.Table:
@@ -138,6 +162,9 @@ def tile_facts(found: TileAnswer) -> dict[str, Any]:
     of_each = [tile.status(best.objective) for tile in tiles.at[0]]
     proven = tiles.upper_bound(0)
     return {
-        "tiles": {status: of_each.count(status) for status in dict.fromkeys((SEARCHED, *of_each))},
-        "tiles_limit": proven if np.isfinite(proven) else None,
+        "counts": {status: of_each.count(status) for status in dict.fromkeys((SEARCHED, *of_each))},
+        "limit": proven if np.isfinite(proven) else None,
     }
+
+
+TABLES = (TILES,)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from sweep.camera.mosaic import Mosaic
-from sweep.study.tiles import distinct_tiles, with_tiles
+from sweep.features.tiles.written import distinct_tiles, written
 
-from ..build import load, one_line
+from ...build import load, one_line
 
 SIX = ("R", "G", "B", "C", "Y", "Cy")
 HEAD = "study: t\nsensor: ar0820\nlights: tl16\n"
@@ -40,13 +40,13 @@ def test_on_a_patch_only_the_counts_make_a_tile(tmp_path: Path) -> None:
 
 def test_for_lamps_of_some_pixels_the_places_make_a_tile() -> None:
     cfas = {"cfas": {"tiles": "2x2", "of": list(SIX)}}
-    assert len(with_tiles(cfas)["cfas"]) == comb(9, 4) == 126
+    assert len(written(cfas)["cfas"]) == comb(9, 4) == 126
     for near in (
         {"scenarios": {"s": {"target": {"distance_m": 50}}}},
         {"pixel": {"crosstalk": 0.1}},
         {"scenarios": {"s": {"each": {"pixel.crosstalk": [0, 0.1]}}}},
     ):
-        assert len(with_tiles(cfas | near)["cfas"]) == 351
+        assert len(written(cfas | near)["cfas"]) == 351
 
 
 def test_a_list_of_patterns_has_each_of_its_pixels_modified(tmp_path: Path) -> None:
