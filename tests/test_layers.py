@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from sweep.features import FEATURES
 from sweep.runs.provenance import _PACKAGES
 
 from .conftest import DEAR, ROOT
@@ -165,5 +166,7 @@ def test_a_wheel_has_every_file_of_the_package() -> None:
 def test_every_dear_test_exists() -> None:
     for line in sorted(DEAR):
         file, _, name = line.partition("::")
+        if file.startswith("tests/features/") and file.split("/")[2] not in FEATURES:
+            continue
         function = name.partition("[")[0].rpartition("::")[2]
         assert f"def {function}(" in (ROOT / file).read_text(encoding="utf-8"), line

@@ -22,7 +22,6 @@ from sweep.camera.pwm import exposure_scales, light_in, phases_of
 from sweep.camera.scene import FixedExposure, PwmDrive, Scene
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.setup import Setup
-from sweep.metrics.evaluate import evaluate
 from sweep.spectra.builtin.registry import BUILT_IN_LIGHTS
 from sweep.spectra.spectrum import WavelengthGrid
 
@@ -250,21 +249,3 @@ def test_light_in_windows_is_that_of_all_phases(duty: float) -> None:
     assert (at_corners.min(axis=1) <= everywhere.min(axis=1) + 1e-12).all()
     assert (at_corners.max(axis=1) >= everywhere.max(axis=1) - 1e-12).all()
     np.testing.assert_allclose(at_corners.min(axis=1), everywhere.min(axis=1), atol=1e-3)
-
-
-def test_staggered_exposures_show_a_false_hue_and_a_split_pixel_none() -> None:
-    scene = Scene(
-        exposure=FixedExposure(exposure_s=0.011),
-        intensity_cd=50.0,
-        drive=PwmDrive(duty=0.1, frequency_hz=200.0),
-        noise=True,
-    )
-    found = {}
-    for captures in ("split_pixel", "staggered"):
-        setup = chart_setup(scene=scene, pixel=Pixel(captures=captures, read_noise_e=2, offset_dn=64))
-        found[captures] = evaluate(scene_model(setup), setup.camera.base_qe[None])
-    assert found["split_pixel"]["false_hue_dn"] < 0.1 * found["split_pixel"]["chromatic_csd_yellow_red"]
-    assert found["split_pixel"]["lamp_seen"] == pytest.approx(1)
-    assert found["staggered"]["false_hue_dn"] > 1_000
-    assert found["staggered"]["lamp_seen"] < 0.5
-    assert found["staggered"]["flicker_modulation"] == pytest.approx(1)

@@ -10,7 +10,6 @@ from sweep.base.errors import StudyError
 from sweep.study import load_study
 
 from ..build import BASE, issues, load, one_line
-from ..conftest import STUDIES
 from ..watchdog import within
 
 MEANING = BASE.replace("    cfa: RYNCy", "    cfa: RYNX").replace("sensitivity:", "sensitivty:")
@@ -162,17 +161,3 @@ def test_faults_of_the_file_beside_those_of_an_option_have_their_lines(tmp_path:
         ("--set cfas.0=RGB", None, "cfas.RGB"),
         ("--set search.space=edgs", None, "search.space"),
     ]
-
-
-def test_published_names_are_checked(tmp_path: Path) -> None:
-    path, text = tmp_path / "paper.yaml", (STUDIES / "paper.yaml").read_text()
-    for old, new, word in (
-        ("    RGGB: {csd", "    RGBG: {csd", "did you mean 'RGGB'"),
-        ("RGGB: {csd_green_yellow", "RGGB: {csd_green_yelow", "did you mean 'csd_green_yellow'"),
-        ("urban: {object_resolution_px", "urban: {sensitivity", "allowed: object_resolution_px"),
-        ("at: paper_N2", "at: RYN5Cy", "unknown built-in filter"),
-    ):
-        assert old in text
-        path.write_text(text.replace(old, new, 1))
-        with pytest.raises(StudyError, match=word):
-            load_study(path)
