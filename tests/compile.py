@@ -33,19 +33,16 @@ def phases_of_lights() -> None:
 
 
 def designs_and_metrics() -> None:
-    """Blocks of filters, distances, errors under noise, worst cases over lamps, drawn images."""
+    """Blocks of filters, distances, errors under noise, worst cases over lamps."""
     import numpy as np
 
     from sweep.camera.noise import errors as confusion
     from sweep.camera.pixel import Pixel
-    from sweep.features.vision.images import HeadCamera
-    from sweep.features.vision.lamps import TEST, split_lamps
-    from sweep.features.vision.scenes import SHUFFLED, draw_scenes
+    from sweep.features import FEATURES
     from sweep.runs import run_study
     from sweep.study import load_study
 
     from .build import STUDY
-    from .vision.heads import NO_FILTERS, head_setup, vision
 
     dim, budget = "exposure: {kind: fixed, exposure_s: 0.002}", "starts: 4, max_evaluations: 200"
     assert dim in STUDY
@@ -63,6 +60,18 @@ def designs_and_metrics() -> None:
     for well_e, bits in ((100.0, 8), (1e5, 16)):
         pixel = Pixel(well_e=well_e, bits=bits, read_noise_e=1.0)
         confusion.errors(np.array([[[9.0, 9, 9], [12.0, 12, 20]]]), channels, pixel, types)
+    if "vision" in FEATURES:
+        images()
+
+
+def images() -> None:
+    """Images of heads."""
+    from sweep.features.vision.images import HeadCamera
+    from sweep.features.vision.lamps import TEST, split_lamps
+    from sweep.features.vision.scenes import SHUFFLED, draw_scenes
+
+    from .features.vision.heads import NO_FILTERS, head_setup, vision
+
     requested, setup = vision(), head_setup()
     scenes = draw_scenes(requested, split_lamps(setup.lights, requested, (1, 0))[TEST], SHUFFLED, 1, (5,))
     HeadCamera(setup, NO_FILTERS, requested).images(scenes)
