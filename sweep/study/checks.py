@@ -41,9 +41,19 @@ def check_features(checked: Checked) -> Iterator[Fault]:
         yield from getattr(module, "faults", lambda _: ())(checked)
 
 
-def check_scenes(section: StudySection) -> Iterator[Fault]:
-    """Check LED norms and that every target forms an image that can be computed."""
+def check_scenes(section: StudySection, mosaics: Mapping[str, Mosaic]) -> Iterator[Fault]:
+    """Check names of channels, the noise of scenes, and that every target forms an image that can be computed."""
+    yield from _check_captures(section, mosaics)
+    for cfa, channels in section.clouds.items():
+        if cfa not in mosaics:
+            yield unknown(("clouds", cfa), "CFA", cfa, mosaics)
+        for at, channel in enumerate(channels if cfa in mosaics else ()):
+            if channel not in mosaics[cfa].channels:
+                yield unknown(("clouds", cfa, at), f"channel of {cfa}", channel, mosaics[cfa].channels)
     for name, scene in section.scenarios.items():
+        if section.recognition is not None and scene.noise is None:
+            problem = "`recognition` needs noise in every scenario"
+            yield Fault(("scenarios", name, "noise"), problem, None, "noise: true")
         if scene.pixel is not None:
             for key in ("captures", "companding"):
                 if getattr(scene.pixel, key) != getattr(section.pixel, key):
@@ -61,19 +71,10 @@ def _check_captures(section: StudySection, mosaics: Mapping[str, Mosaic]) -> Ite
             yield unknown(("pixel", "captures", number, "qe_factor"), "channel", channel, channels)
 
 
-def check_lights(
-    section: StudySection, lights: Lights, mosaics: Mapping[str, Mosaic], requested: RequestedQuantities
-) -> Iterator[Fault]:
+def check_lights(section: StudySection, lights: Lights, requested: RequestedQuantities) -> Iterator[Fault]:
     """Check keys that name signal types or columns, or that need lamps."""
     yield from _check_columns(requested)
     yield from _check_recognition(section, lights)
-    for cfa, channels in section.clouds.items():
-        if cfa not in mosaics:
-            yield unknown(("clouds", cfa), "CFA", cfa, mosaics)
-        for at, channel in enumerate(channels if cfa in mosaics else ()):
-            if channel not in mosaics[cfa].channels:
-                yield unknown(("clouds", cfa, at), f"channel of {cfa}", channel, mosaics[cfa].channels)
-    yield from _check_captures(section, mosaics)
 
 
 def _check_columns(requested: RequestedQuantities) -> Iterator[Fault]:
@@ -100,10 +101,6 @@ def _check_recognition(section: StudySection, lights: Lights) -> Iterator[Fault]
         yield Fault(("recognition", "states"), "a signal type is named twice", states)
     if len(lights.classes) < 2:
         yield Fault(("recognition",), "there is one signal type only", lights.classes[0], "two or more")
-    for name, scene in section.scenarios.items():
-        if scene.noise is None:
-            problem = "`recognition` needs noise in every scenario"
-            yield Fault(("scenarios", name, "noise"), problem, None, "noise: true")
 
 
 def check_size(study: Study) -> Iterator[Fault]:

@@ -294,7 +294,7 @@ class Document:
         node: Any = self.data
         place: Place = 1
         for at, part in enumerate(path):
-            key = _written(node, part)
+            key = written(node, part)
             if isinstance(node, list) and isinstance(part, str) and part in node:
                 key = node.index(part)  # a list of names, which is read as a mapping
             if not _has(node, key):
@@ -320,27 +320,31 @@ class Document:
 
     def issues(self, error: ValidationError, model: type[BaseModel]) -> list[ValidationIssue]:
         """Convert pydantic's errors to issues of this file."""
+        more = error.error_count() - _MOST_LOOKED_AT
+        issues = by_line(issue for _, issue in self.faults(error, model))
+        return issues + ([ValidationIssue(f"and about {more:,} more errors", self.file)] if more > 0 else [])
+
+    def faults(self, error: ValidationError, model: type[BaseModel]) -> list[tuple[KeyPath, ValidationIssue]]:
+        """Convert pydantic's errors to issues with the paths of the keys that were meant."""
         issues: dict[tuple[KeyPath, str], ValidationIssue] = {}
         # A default that follows from other keys is no error of its own where these are wrong.
         items = [item for item in error.errors(include_url=False) if item["type"] != "default_factory_not_called"]
         schema = model.model_json_schema() if any(item["type"] == "extra_forbidden" for item in items) else {}
-        meant = set()
+        meant: dict[KeyPath, KeyPath] = {}
         for item in islice(items, _MOST_LOOKED_AT):
             path = self._path(item["loc"], missing=item["type"] in ("missing", "extra_forbidden"))
             issue = self._issue(path, item, schema)
             issues.setdefault((path, issue.problem), issue)
-            if item["type"] == "extra_forbidden":
-                meant.add((*path[:-1], issue.nearest))
+            if item["type"] == "extra_forbidden" and issue.nearest is not None:
+                meant[path] = (*path[:-1], issue.nearest)
         # A misspelled key is one issue, not a second one because the right key is missing; and a fault inside a value
         # is no second one because another form of the value would not fit either.
         above = {path[:end] for path, _ in issues for end in range(len(path))}
-        shown = [
-            issue
+        return [
+            (path, issue)
             for (path, problem), issue in issues.items()
-            if not (problem == "missing" and path in meant) and not (problem == _NOT_ALLOWED and path in above)
+            if not (problem == "missing" and path in meant.values()) and not (problem == _NOT_ALLOWED and path in above)
         ]
-        more = len(items) - _MOST_LOOKED_AT
-        return by_line(shown) + ([ValidationIssue(f"and about {more:,} more errors", self.file)] if more > 0 else [])
 
     def _path(self, loc: Sequence[Key], *, missing: bool) -> KeyPath:
         """Return `loc` without the tags that pydantic adds for unions; with its last key if that is `missing`."""
@@ -348,7 +352,7 @@ class Document:
         path: list[Key] = []
         varied: set[Key] = set()
         for position, part in enumerate(loc):
-            key = _written(node, part)
+            key = written(node, part)
             if key != part:
                 varied = {part for name in node[key].get("each", ()) for part in str(name).split(".")}
             if _has(node, key):
@@ -434,7 +438,7 @@ def _child(node: Any, key: Key) -> Any:
     return node[key] if _has(node, key) else None
 
 
-def _written(node: Any, key: Key) -> Key:
+def written(node: Any, key: Key) -> Key:
     """Return the key as the file has it: a scenario made by `each` is named after the one that it was made from."""
     if isinstance(node, dict) and isinstance(key, str) and key not in node:
         for name, entry in node.items():

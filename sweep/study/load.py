@@ -16,6 +16,7 @@ from ..spectra.spectrum import Curves
 from .document import Document
 from .members import SensorAndLights, SensorStudies, of_one_fit
 from .model import Study
+from .partial import Partial
 from .resolve import resolve
 from .schema import StudySection
 from .sources import KeptSources, Sources
@@ -48,7 +49,7 @@ def load_study(
     chosen, notes = member or next(iter(members), None), list[str]()
     if chosen is not None:
         several.choose(document, chosen)
-    section = _checked(document)
+    section, partial = _checked(document)
     if chosen is not None and (max(chosen.indices) >= 0 or chosen.pixel):
         section, notes = several.narrowed(section, chosen)
         if len(members) > 1:
@@ -56,7 +57,7 @@ def load_study(
     if data is not None and not is_folder(data):
         raise StudyError(ValidationIssue("no such folder", None, None, "--data", str(data)))
     folders = [path.parent] if data is None else [data, path.parent]
-    sources = Sources(document, section.wavelengths, folders, stored, allow_code=allow_code)
+    sources = Sources(document, section.wavelengths, folders, stored, allow_code=allow_code, partial=partial)
     sources.warnings += notes
     return resolve(section, sources)
 
@@ -93,16 +94,22 @@ def study_of_keys(
     `folder`: folder of relative file names. Raises StudyError as `load_study`, without file and line.
     """
     document = Document(keys)
-    section = _checked(document)
-    return resolve(section, Sources(document, section.wavelengths, [folder], None, given, allow_code))
+    section, partial = _checked(document)
+    return resolve(section, Sources(document, section.wavelengths, [folder], None, given, allow_code, partial))
 
 
-def _checked(document: Document) -> StudySection:
-    """Return the study as its schema has it. Raises StudyError with the issues of the schema."""
+def _checked(document: Document) -> tuple[StudySection, Partial | None]:
+    """Return the study as its schema has it; what is left of a faulty one, whose other faults are then looked for.
+
+    Raises StudyError with the issues of the schema where too little is left.
+    """
     try:
-        return of_one_fit(StudySection.model_validate(document.data))
+        return of_one_fit(StudySection.model_validate(document.data)), None
     except ValidationError as error:
-        raise StudyError(document.issues(error, StudySection)) from None
+        partial = Partial(document, error)
+    if partial.section is None:
+        raise StudyError(partial.issues)
+    return of_one_fit(partial.section), partial
 
 
 def folder_name(study_name: str) -> str:

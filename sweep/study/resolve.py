@@ -62,18 +62,18 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         if section.uncertainty is not None and section.uncertainty.ir_cut_nm and sensor.ir_cut is None:
             note = f"{sensor.name}: no IR cut is known apart, and `uncertainty.ir_cut_nm` has no effect"
             sources.warnings.append(note)
-    sources.refuse(*checks.check_scenes(section))
+    sources.refuse(*checks.check_scenes(section, mosaics))
     search = search_of(section, spaces, sources)
     if lights is not None:
         requested = requested_quantities(section, lights, features, metrics or ())
         section = with_pairs_in_order(section, requested)
-        sources.refuse(*checks.check_lights(section, lights, mosaics, requested), *check_luminances(section, lights))
+        sources.refuse(*checks.check_lights(section, lights, requested), *check_luminances(section, lights))
         sources.refuse(
             *checks.check_features(checks.Checked(section, lights, mosaics, search, sensor, spaces, features))
         )
         if metrics is not None and are_known:
             sources.refuse(*_goal_faults(section, metrics, requested, spaces, search, sources))
-    if sources.issues or sensor is None or lights is None:
+    if sources.partial is not None or sources.issues or sensor is None or lights is None:
         raise sources.error
     study = Study(
         name=section.study,

@@ -30,6 +30,7 @@ from ..spectra.spectrum import (
 )
 from ..spectra.units import Use, used_as
 from .document import Document, KeyPath, by_line
+from .partial import Partial
 from .schema_curves import ColorantsSection, FileEntry
 
 _MOST_VALUES = 10_000_000
@@ -63,7 +64,8 @@ class Sources:
     """Reader of the files of one study, each once; collects issues, warnings and digests.
 
     `stored`: the curves of a finished run; no file is read then. `given`: files that are not on a disk, by their names.
-    `allow_code`: code that the study names may run, or only code with these digests.
+    `allow_code`: code that the study names may run, or only code with these digests. `partial`: of a study with faulty
+    keys, whose issues are told with all others, and for which checks wait.
     """
 
     document: Document
@@ -72,23 +74,29 @@ class Sources:
     stored: KeptSources | None = None
     given: Mapping[str, Curves] = field(default_factory=dict)
     allow_code: bool | Mapping[str, str] = False
+    partial: Partial | None = None
     issues: list[ValidationIssue] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)
     _read: dict[str, Curves | None] = field(default_factory=dict)
+    _waiting: list[ValidationIssue] = field(default_factory=list)
 
     @property
     def error(self) -> StudyError:
         """All issues, in the order of their lines."""
-        return StudyError(by_line(self.issues))
+        of_schema = [] if self.partial is None else self.partial.issues
+        told = [issue for issue in self.issues if not any(issue is other for other in self._waiting)]
+        return StudyError(by_line([*of_schema, *told]))
 
     def refuse(self, *faults: Fault) -> None:
-        """Collect faults."""
+        """Collect faults; those of checks that wait for faulty keys are not told."""
         for fault in faults:
             near = fault.nearest
             if fault.known and len(self.issues) < MOST_ISSUES:
                 near = nearest(fault.value, fault.known)
             self.issues.append(self.document.issue(fault.path, fault.problem, fault.value, fault.allowed, near))
+            if self.partial is not None and self.partial.waits(fault):
+                self._waiting.append(self.issues[-1])
 
     def fits(self, path: KeyPath, what: str, count: int) -> bool:
         """Return True if curves on the wavelength grid fit into memory; add an issue otherwise."""
@@ -128,9 +136,9 @@ class Sources:
         low, high = BUILT_IN_RANGE_NM
         inside = low <= self.grid.start_nm < self.grid.stop_nm <= high
         grid = f"{self.grid.start_nm:g} to {self.grid.stop_nm:g} nm"
-        issue = self.document.issue(("wavelengths",), f"{what} end before the grid", grid, f"{low:g} to {high:g} nm")
-        if not inside and issue not in self.issues:
-            self.issues.append(issue)
+        fault = Fault(("wavelengths",), f"{what} end before the grid", grid, f"{low:g} to {high:g} nm")
+        if not inside and not any(issue.problem == fault.problem for issue in self.issues):
+            self.refuse(fault)
         return inside
 
     def photons(self, path: KeyPath, curves: Curves | None, column: str, entry: FileEntry) -> PerWavelength | None:
