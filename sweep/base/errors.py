@@ -12,6 +12,8 @@ MOST_ISSUES = 50
 _MOST_KNOWN = 1000
 _MOST_LETTERS = 100
 _MOST_OF_A_PART = 2000
+_MOST_SAID, _LEAST_LISTED, _FEW_NAMES = 160, 60, 5
+"""Letters of a line beside its file, from which on names that are allowed are cut; so many of these stay."""
 
 
 def nearest(name: object, known: Iterable[str]) -> str | None:
@@ -56,10 +58,10 @@ class ValidationIssue:
         text = ": ".join([*parts, _cut(self.problem)])
         if self.value is not None:
             text += f" (got {_short(self.value)})"
-        if self.allowed is not None:
-            text += f"; allowed: {_cut(self.allowed)}"
         if self.nearest is not None:
             text += f"; did you mean {self.nearest!r}?"
+        if self.allowed is not None:
+            text += f"; allowed: {_listed(self.allowed, max(_LEAST_LISTED, _MOST_SAID - len(text)))}"
         # Nothing of a file steers a terminal, or fails to be written to it.
         return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 
@@ -195,6 +197,13 @@ def _capped(issues: Sequence[ValidationIssue]) -> tuple[ValidationIssue, ...]:
         return tuple(issues)
     more = len(issues) - MOST_ISSUES + 1
     return (*issues[: MOST_ISSUES - 1], ValidationIssue(f"and {more:,} more errors", issues[0].file))
+
+
+def _listed(allowed: str, limit: int) -> str:
+    """Return what is allowed, of many names as many as there is room for."""
+    if len(allowed) <= limit or allowed.count(", ") < _FEW_NAMES:
+        return _cut(allowed)
+    return f"{allowed[: limit - 5].rpartition(', ')[0]}, ..."
 
 
 def _short(value: object, limit: int = 60) -> str:

@@ -77,7 +77,7 @@ def test_a_filter_a_little_above_the_curve_it_replaces_has_a_limit_too(tmp_path:
     ("requested", "said"),
     [
         (["filter.csv", "--channel", "Q"], "--channel: no such channel of RYNCy"),
-        (["filter.csv", "--column", "t"], "--column: no such column (got 't'); allowed: T; did you mean 'T'?"),
+        (["filter.csv", "--column", "t"], "--column: no such column (got 't'); did you mean 'T'?; allowed: T"),
         (["filter.csv", "--sensor", "ar0802"], "did you mean 'ar0820'?"),
         (["filter.csv", "--design", "best"], "`design` requires a run folder"),
         (["above.csv"], "values up to 1.5 are no transmission"),
