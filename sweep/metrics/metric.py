@@ -21,8 +21,11 @@ class Metric(ABC):
     order: ClassVar[int] = 99
     needs: ClassVar[str] = "readings"
     """What there must be: "readings", "noise", "any brightness", "pulses", "filters", "parameters", or a feature."""
-    of_scene: ClassVar[bool] = True
-    """False: no effect of a scene changes its columns."""
+
+    @property
+    def of_scene(self) -> bool:
+        """True if effects of a scene change its columns."""
+        return self.needs not in ("filters", "parameters")
 
     @abstractmethod
     def quantities(self, requested: RequestedQuantities) -> Sequence[Quantity]:

@@ -17,6 +17,7 @@ import pyarrow as pa
 
 from ..base.disk import digest_of, is_link, is_real_folder, read_facts
 from ..base.errors import OutputError, ValidationIssue
+from ..features import gathered
 from ..study import SensorAndLights
 from .atomic import write_bytes
 from .dataset import part_paths, strange_entries
@@ -24,6 +25,7 @@ from .tables import (
     MANIFEST,
     PROVENANCE,
     RESULTS,
+    is_drawn,
     is_of_run,
     json_of,
     made_by_run,
@@ -223,7 +225,7 @@ class Manifest:
 
     def discard_derived(self) -> None:
         """Remove the report, and what commands added, which follow from tables that are gone."""
-        self.remove([name for name in self.files if not _by_run(name)])
+        self.remove([name for name in self.files if is_drawn(name) or name in gathered("ADDED")])
 
     def discard(self) -> None:
         """Remove the manifest of a run without files."""

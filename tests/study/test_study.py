@@ -35,7 +35,10 @@ def test_a_study_is_resolved(tmp_path: Path) -> None:
     [
         ("wavelength_nm,R,C\n400,2,5\n700,2,5\n", "qe.csv, column R: values up to 5 are no QE"),
         ("wavelength_nm,R,C\n450,0.1,0.5\n700,0.2,0.5\n", "qe.csv, column R: the curve is truncated"),
-        ("wavelength_nm,r,C\n400,0.1,0.5\n700,0.2,0.5\n", "unknown column of qe.csv (got 'R'); did you mean 'r'?; allowed: r, C"),
+        (
+            "wavelength_nm,r,C\n400,0.1,0.5\n700,0.2,0.5\n",
+            "unknown column of qe.csv (got 'R'); did you mean 'r'?; allowed: r, C",
+        ),
     ],
 )
 def test_a_wrong_curve_file_is_a_fault_of_the_study(tmp_path: Path, qe: str, expected: str) -> None:

@@ -24,7 +24,11 @@ class TaskFigures(Metric):
 
     order = 6
     needs = "tasks"
-    of_scene = False
+
+    @property
+    def of_scene(self) -> bool:
+        """False: a task has conditions of its own."""
+        return False
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         tasks = requested.asked("tasks")

@@ -23,7 +23,6 @@ class SmallestWidths(Metric):
 
     order = 4
     needs = "parameters"
-    of_scene = False
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         return tuple(

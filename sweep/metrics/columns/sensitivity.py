@@ -32,7 +32,6 @@ class Sensitivity(Metric):
 
     order = 1
     needs = "filters"
-    of_scene = False
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         of_filter = Quantity(

@@ -18,7 +18,6 @@ class Shape(Metric):
 
     order = 2
     needs = "filters"
-    of_scene = False
 
     def quantities(self, requested: RequestedQuantities) -> tuple[Quantity, ...]:
         slope = Quantity(

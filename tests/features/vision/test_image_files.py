@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 from scipy.integrate import trapezoid
 
-from sweep import read_run
+from sweep import images, read_run
 from sweep.features.vision.batches import formed
 from sweep.features.vision.images import HeadCamera
 from sweep.features.vision.isp import isp_of
@@ -90,14 +90,14 @@ def test_raw_images_are_those_that_the_observer_reads(run: Path, tmp_path: Path)
     }  # of two seeds; the test shows the street's order, too
     assert manifest["image_id"].is_unique
     row, setup, curves = vision_designs(study, output.named_rows)[1]
-    vision, seed = study.section.vision, (study.section.seed, 1)
+    vision, seed = study.section.key("vision"), (study.section.seed, 1)
     camera = HeadCamera(setup, curves, vision)
     scenes = scenes_of(vision, split_lamps(setup.lights, vision, seed), "shuffled", TEST, seed)
     here = manifest.query("name == 'RYYCy' and seed == 1 and order == 'shuffled' and split == 'test'")
     held = np.stack([image(tmp_path / "raw", one) for _, one in here.iterrows()])
     assert held.dtype == np.uint16
     np.testing.assert_array_equal(held, camera.images(scenes))
-    yielded = list(read_run(run).images("test", ["RYYCy"]))
+    yielded = list(images(read_run(run), "test", ["RYYCy"]))
     labels = pd.concat([batch.labels for batch in yielded], ignore_index=True)
     at = pd.Index(labels["image_id"]).get_indexer(here["image_id"])
     np.testing.assert_array_equal(np.concatenate([batch.images for batch in yielded])[at], held)
