@@ -10,6 +10,7 @@ import fnmatch
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from io import StringIO
 from itertools import islice
 from pathlib import Path
@@ -75,6 +76,15 @@ Place = int | str
 """A line from 1, or the option that a value came from."""
 
 
+@lru_cache(maxsize=4)
+def _composed(text: str) -> Node | None:
+    """Return the nodes of a document, once for all members of a study of several."""
+    yaml = YAML(typ="safe", pure=True)
+    yaml.composer.warn_double_anchors = False
+    root: Node | None = yaml.compose(StringIO(text))
+    return root
+
+
 class Tree:
     """The value of a YAML document (YAML 1.2, core schema; `<<` merges mappings), and the line of each of its keys.
 
@@ -87,11 +97,9 @@ class Tree:
         self._lines: dict[int, tuple[Any, dict[Key, Place]]] = {}  # with its value, so that no other one has the id
         if version := re.match(r"%YAML\s+(?!1\.2\s)\S*", text):
             raise self._error("another version of YAML", 1, (), version.group(), "%YAML 1.2, or no such line")
-        yaml = YAML(typ="safe", pure=True)
-        yaml.composer.warn_double_anchors = False
-        self._resolve = yaml.resolver.resolve
+        self._resolve = YAML(typ="safe", pure=True).resolver.resolve
         try:
-            root = yaml.compose(StringIO(text))
+            root = _composed(text)
         except MarkedYAMLError as error:
             said = ", ".join(part for part in (error.context, error.problem) if part)
             words, begins = next((told for part, *told in _YAML_FAULTS if part in said), (said, False))
