@@ -12,7 +12,6 @@ from ..base.types import DesignCurves, DesignParameters
 from ..designs.family import Family, Parameter
 from ..designs.space import Filter, Space
 from ..designs.technology import Technology
-from ..designs.ungridded import PairedDesigns
 from ..metrics.bound import total_violation
 from ..metrics.objective import COMBINED
 from ..metrics.quantity import Columns
@@ -135,7 +134,7 @@ def designs_of_parameters(study: Study, cfa: str | None, parameters: Mapping[str
     if {len(axis) for axis in axes} - {1, size}:
         counts = {p: len(axis) for p, axis in zip(space.parameters, axes, strict=True)}
         raise SweepError(ValidationIssue("as many values of each parameter, or one", value=counts))
-    return Space("design", OWN, space.cfa, space.filter, tuple(axes), gridded=False, rows=PairedDesigns(size))
+    return Space("design", OWN, space.cfa, space.filter, tuple(axes), gridded=False, listed=size)
 
 
 def _values(parameter: Parameter, stated: Any) -> tuple[float, ...]:

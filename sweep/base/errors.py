@@ -19,9 +19,8 @@ _MOST_SAID, _LEAST_LISTED, _FEW_NAMES = 160, 60, 5
 def nearest(name: object, known: Iterable[str]) -> str | None:
     """Return the known name that is most similar to `name`.
 
-    Compares letters (difflib) and, for names of several words, words in any order. Only the first 1000 names and names
-    of
-    up to 100 letters are compared, which bounds the time.
+    Compares letters (difflib) and, for names of several words, words in any order. Only the first 1000 names, and those
+    of up to 100 letters, are compared, which bounds the time.
 
     None if no name is similar.
     """
@@ -61,7 +60,8 @@ class ValidationIssue:
         if self.nearest is not None:
             text += f"; did you mean {self.nearest!r}?"
         if self.allowed is not None:
-            text += f"; allowed: {_listed(self.allowed, max(_LEAST_LISTED, _MOST_SAID - len(text)))}"
+            beside = len(text) - len(_cut(place))
+            text += f"; allowed: {_listed(self.allowed, max(_LEAST_LISTED, _MOST_SAID - beside))}"
         # Nothing of a file steers a terminal, or fails to be written to it.
         return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 

@@ -13,9 +13,11 @@ from ..base.types import Array, DesignCurves, DesignNumbers, DesignParameters, F
 from .family import Family
 from .technology import Technology
 from .tolerance import AS_DESIGNED, ProductionError
-from .ungridded import Axes, ListedDesigns
 
 Kind = Literal["reference", "design", "sweep", "search"]
+
+
+Axes = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -35,10 +37,11 @@ class Filter:
 
 @dataclass(frozen=True)
 class Space:
-    """Set of designs on one CFA: a full-factorial grid, `rows`, or a box that is searched but not swept.
+    """Set of designs on one CFA: a full-factorial grid, listed ones, or a box that is searched but not swept.
 
     `filter`: left out for a plain CFA, which has no axes and one design; `gridded`: False for a box that is searched
-    but not swept. `axes`: values of each parameter; in a grid the last one runs fastest.
+    but not swept. `axes`: values of each parameter; in a grid the last one runs fastest. `listed`: so many designs, of
+    which the i-th has the i-th value of every axis, or its only one.
     """
 
     kind: Kind
@@ -47,13 +50,13 @@ class Space:
     filter: Filter | None = None
     axes: Axes = ()
     gridded: bool = True
-    rows: ListedDesigns | None = None
+    listed: int = 0
 
     @property
     def size(self) -> int:
         """Number of designs; 0 for a box that is searched but not swept."""
-        if self.rows is not None:
-            return self.rows.size
+        if self.listed:
+            return self.listed
         return math.prod(len(axis) for axis in self.axes) if self.gridded else 0
 
     @property
@@ -83,9 +86,9 @@ class Space:
 
         `numbers`: numbers of the designs, at least one.
         """
-        if self.rows is not None:
-            start = int(numbers.min())
-            return self.rows.points(self.axes, start, int(numbers.max()) + 1)[numbers - start]
+        if self.listed:
+            every = [np.broadcast_to(np.asarray(axis, dtype=float), self.listed)[numbers] for axis in self.axes]
+            return np.stack(every, axis=1)
         digits = zip(self.axes, self.digits(numbers), strict=True)
         columns = [np.asarray(axis, dtype=float)[digit] for axis, digit in digits]
         return np.stack(columns, axis=1) if columns else np.empty((len(numbers), 0))

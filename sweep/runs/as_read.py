@@ -9,8 +9,8 @@ import numpy as np
 
 from ..base.types import FloatArray, Progress
 from ..camera.setup import Setup
+from ..designs.sobol import sobol_points
 from ..designs.space import Space
-from ..designs.ungridded import PairedDesigns, sobol_points
 from ..metrics.bound import FEASIBLE, Bound, total_violation
 from ..metrics.quantity import Columns
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible
@@ -65,7 +65,7 @@ class Reading:
         asked = {name: quantity for name, quantity in quantities.items() if name in names}
         wanted = Wanted.of(asked, rules.requested, rules.shown)
         axes = tuple(tuple(map(float, values)) for values in np.transpose(points))
-        space = replace(self.space, axes=axes, rows=PairedDesigns(len(points)))
+        space = replace(self.space, axes=axes, listed=len(points))
         for setup in self.setups:
             yield quantities_at(space, np.arange(len(points)), setup, rules, wanted)[0]
 

@@ -10,8 +10,8 @@ import numpy as np
 from ..base.types import Array, Float, IndexArray, Int, PerParameter
 from ..camera.setup import Setup
 from ..designs.family import Family
+from ..designs.sobol import sobol_points
 from ..designs.tolerance import AS_DESIGNED, NONE, ProductionError, Tolerance
-from ..designs.ungridded import sobol_points
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.objective import Objective

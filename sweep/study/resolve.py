@@ -19,7 +19,7 @@ from .model import Search, Study, requested_quantities
 from .schema import CfaSection, StudySection
 from .sensors import check_lenses, check_uncertainty, sensor_of, with_chief_rays, with_technologies
 from .sources import Sources
-from .spaces import SpaceBuilder, check_cfas
+from .spaces import SpaceBuilder, check_cfas, with_listed_designs
 from .user_code import check_names, try_effects, try_metrics, user_effects, user_metrics
 
 _Made = TypeVar("_Made")
@@ -39,7 +39,7 @@ def resolve(section: StudySection, sources: Sources) -> Study:
             return None
 
     lit = attempt(lambda: with_light_files(section, sources))
-    section = with_chief_rays(lit or section, sources)
+    section = with_listed_designs(with_chief_rays(lit or section, sources), sources)
     sensor = attempt(lambda: sensor_of(section.sensor, sources))
     lights = attempt(lambda: lights_of(section.lights, sources)) if lit else None
     mosaics = {

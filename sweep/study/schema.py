@@ -27,6 +27,7 @@ from .cameras import CameraName, with_camera
 from .schema_curves import (
     LIGHTS_NAME,
     ColorantsSection,
+    FilePath,
     LightsSection,
     Name,
     SensorSection,
@@ -38,7 +39,6 @@ from .schema_curves import (
 
 _MOST_ROWS = 64
 _MOST_LETTERS = 100
-_MOST_DRAWN = 1_000_000
 _MOST_OWN = 50
 _MOST_BOXES = 10_000
 MOST_TYPES = 40
@@ -103,47 +103,35 @@ class DesignSection(Modification):
 
 
 class SweepSection(Modification):
-    """Filters over the family's parameters: one of `grid`, `sobol`, `lhs`, `zip` and `list`.
-
-    What `sobol` and `lhs` draw depends on the study's `seed`.
-    """
+    """Filters over the family's parameters: one of `grid` and `values`."""
 
     grid: dict[Name, Values] | None = None
     """Every combination of the values."""
-    sobol: Annotated[int, Field(ge=1, le=_MOST_DRAWN)] | None = None
-    """So many designs of a scrambled Sobol sequence in `box`; powers of 2 fill it most evenly."""
-    lhs: Annotated[int, Field(ge=1, le=_MOST_DRAWN)] | None = None
-    """So many designs of a Latin hypercube in `box`."""
-    box: dict[Name, Span] | None = None
-    """For `sobol` and `lhs`; a parameter that is not named has its default, or may take all its family's values."""
-    paired: Annotated[dict[Name, Values] | None, Field(alias="zip", min_length=1)] = None
-    """The first values of all parameters, then the second ones; a single number holds for all."""
-    listed: Annotated[list[Annotated[dict[Name, Number], Field(min_length=1)]] | None, Field(alias="list")] = None
-    """Designs one by one, each with the same parameters."""
+    values: (
+        Annotated[list[Annotated[dict[Name, Number], Field(min_length=1)]], Field(min_length=1)] | FilePath | None
+    ) = None
+    """Designs one by one, each with the same parameters; or a CSV of at most 10,000 rows with a column a parameter."""
 
     @model_validator(mode="after")
     def _one_way(self) -> SweepSection:
-        ways = {"grid": self.grid, "sobol": self.sobol, "lhs": self.lhs, "zip": self.paired, "list": self.listed}
-        given = [name for name, way in ways.items() if way is not None]
-        if len(given) != 1:
-            raise ValueError(f"one of `{'`, `'.join(ways)}`; there is {' and '.join(given) or 'none of them'}")
-        if (self.box is not None) != self.drawn:
-            raise ValueError("`box` goes with `sobol` and `lhs`, which draw from it")
-        sizes = {name: axis.size for name, axis in (self.paired or {}).items()}
-        if len(set(sizes.values()) - {1}) > 1:
-            counts = ", ".join(f"{name} {size}" for name, size in sizes.items())
-            raise ValueError(f"zip: as many values of each parameter, or a single one; there are: {counts}")
-        if self.listed is not None and not self.listed:
-            raise ValueError("list: one design or more")
-        for number, design in enumerate(self.listed or (), 1):
-            if self.listed and set(design) != set(self.listed[0]):
-                raise ValueError(f"list: design {number} names other parameters than the first one")
+        if (self.grid is None) == (self.values is None):
+            raise ValueError(f"one of `grid` and `values`; there {'are both' if self.grid else 'is none of them'}")
+        for number, design in enumerate(self.listed, 1):
+            if set(design) != set(self.listed[0]):
+                raise ValueError(f"values: design {number} names other parameters than the first one")
         return self
 
     @property
-    def drawn(self) -> bool:
-        """Return whether its designs are drawn from a box."""
-        return self.sobol is not None or self.lhs is not None
+    def listed(self) -> list[dict[str, float]]:
+        """Designs one by one; none of a grid, nor of a file."""
+        return self.values if isinstance(self.values, list) else []
+
+    @property
+    def axes(self) -> dict[str, tuple[float, ...]]:
+        """Values of each parameter."""
+        if self.grid is not None:
+            return {name: axis.points() for name, axis in self.grid.items()}
+        return {name: tuple(design[name] for design in self.listed) for name in self.listed[0]}
 
 
 class BoxSection(Modification):

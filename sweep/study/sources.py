@@ -7,12 +7,13 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
-from ..base.disk import is_file, is_folder
+from ..base.disk import is_file, is_folder, read_input
 from ..base.errors import MOST_ISSUES, DataError, Fault, StudyError, ValidationIssue, faults_of, nearest, unknown
 from ..base.types import PerWavelength
 from ..camera.sensor import SensorCurves
@@ -35,6 +36,8 @@ from .schema_curves import ColorantsSection, FileEntry
 
 _MOST_VALUES = 10_000_000
 """Most values of the curves of a sensor, or of lights, on the grid: 80 MB."""
+_MOST_BYTES, _MOST_DESIGNS = 10_000_000, 10_000
+"""Of a file of designs."""
 _MOST_REFUSED = 5
 """Spectra that were not read and that a note names."""
 _CUT_OFF = 0.01
@@ -279,6 +282,28 @@ class Sources:
         `corner_mm`: image height of the corner in mm.
         """
         return self._content(path, file, lambda place: read_chief_rays(place, corner_mm))
+
+    def designs(self, path: KeyPath, file: str) -> list[dict[str, float]] | None:
+        """Read designs from a CSV with a column for each parameter; None after adding an issue."""
+        place = self.file(path, file)
+        if place is None:
+            return None
+        import pandas as pd  # noqa: PLC0415  (slow to import, and few studies list designs in files)
+
+        content = read_input(place, _MOST_BYTES, StudyError)
+        try:
+            table = pd.read_csv(BytesIO(content), nrows=_MOST_DESIGNS + 1).astype(float)
+        except ValueError as error:
+            problem = " ".join(str(error).split())
+            allowed = "a head of names, and a row of numbers for each design"
+            self.refuse(Fault(path, f"{file}: {problem}", None, allowed))
+            return None
+        if not 0 < len(table) <= _MOST_DESIGNS or not np.isfinite(table.to_numpy()).all():
+            allowed = f"1 to {_MOST_DESIGNS:,} designs, each with a number for every parameter"
+            self.refuse(Fault(path, f"{file}: designs that cannot be used", len(table), allowed))
+            return None
+        self.digests[file] = hashlib.sha256(content).hexdigest()
+        return [{str(key): value for key, value in row.items()} for row in table.to_dict("records")]
 
     def _content(self, path: KeyPath, file: str, read: Callable[[Path], _Content]) -> _Content | None:
         """Return the contents of a file, and keep its notes and its digest; None after adding issues."""

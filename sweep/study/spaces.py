@@ -17,18 +17,16 @@ from ..designs.plugin import PluginFamily
 from ..designs.registry import FAMILIES, PIGMENTS, build_family
 from ..designs.space import Filter, Kind, Space
 from ..designs.technology import PIGMENT
-from ..designs.ungridded import ListedDesigns, Method, PairedDesigns, SampledDesigns
 from ..spectra.builtin.surrogate import parameters_of
 from ..spectra.colorants import Colorants
 from .document import KeyPath
-from .schema import BoxSection, DesignSection, Modification, StudySection, SweepSection
+from .schema import BoxSection, DesignSection, Modification, StudySection
 from .sensors import check_filter
 from .sources import Sources
 from .user_code import allowed, code_of, is_from_outside
 
 _MOST_POINTS = 2_000_000
 _OUT_OF_ORDER_NM = 1e-9
-_MOST_DRAWN = 10_000_000
 _FAMILIES: Offered = "sweep.families"
 
 
@@ -83,8 +81,9 @@ class SpaceBuilder:
                 axes: dict[str, tuple[float, ...]] = {key: (value,) for key, value in at.items()}
                 spaces += self._filtered("design", name, design, axes, ("designs", name, "at"))
         for name, sweep in section.sweeps.items():
-            way, axes, rows = _sweep_axes(sweep, section.seed)
-            spaces += self._filtered("sweep", name, sweep, axes, ("sweeps", name, way), rows)
+            way, listed = "grid" if sweep.grid is not None else "values", len(sweep.listed)
+            if sweep.grid is not None or sweep.listed:  # a file that cannot be read has a fault
+                spaces += self._filtered("sweep", name, sweep, sweep.axes, ("sweeps", name, way), listed)
         return spaces + self._boxes()
 
     def _boxes(self) -> list[Space]:
@@ -107,7 +106,7 @@ class SpaceBuilder:
     def _fits(self) -> bool:
         """Return whether the axes of all grids and boxes can be written out; else add an issue."""
         sweeps, boxes = self.section.sweeps.values(), self.section.boxes.values()
-        stated = [*(sweep.grid or sweep.box or sweep.paired or {} for sweep in sweeps), *(box.box for box in boxes)]
+        stated = [*(sweep.grid or {} for sweep in sweeps), *(box.box for box in boxes)]
         total = sum(axis.size for axes in stated for axis in axes.values())
         if total > _MOST_POINTS:
             allowed = f"at most {_MOST_POINTS:,} in all axes together"
@@ -182,7 +181,7 @@ class SpaceBuilder:
         entry: Modification,
         axes: Mapping[str, tuple[float, ...]],
         axes_path: KeyPath,
-        rows: ListedDesigns | None = None,
+        listed: int = 0,
     ) -> list[Space]:
         before = len(self.sources.issues)
         path = axes_path[:-1]
@@ -208,25 +207,20 @@ class SpaceBuilder:
             return []
         usual = family.usual_box(base) if kind == "search" else {}
         ordered = self._axes({**usual, **axes}, axes_path, family.parameters)
-        if rows is not None and rows.size * len(ordered) > _MOST_DRAWN:
-            allowed = f"at most {_MOST_DRAWN // len(ordered):,} designs of {len(ordered)} parameters"
-            self.sources.refuse(Fault(path, "too many designs that are no grid", f"{rows.size:,}", allowed))
         if isinstance(family, ChoosingFamily):
-            self._check_numbers(family, ordered, rows, axes_path)
+            self._check_numbers(family, ordered, axes_path)
         if len(self.sources.issues) > before:
             return []
         target_name = "" if entry.to is None else str(entry.to)
         candidate = Filter(family, dict.fromkeys(entry.channel, entry.base), target_name, entry.technology)
-        space = Space(kind, name, entry.cfa, candidate, tuple(ordered), kind != "search" and rows is None, rows)
+        space = Space(kind, name, entry.cfa, candidate, tuple(ordered), kind != "search" and not listed, listed)
         self.sources.refuse(*check_filter(space, path, self.sensor), *_check_formed(space, axes_path))
         return [space]
 
-    def _check_numbers(
-        self, family: ChoosingFamily, axes: list[tuple[float, ...]], rows: ListedDesigns | None, path: KeyPath
-    ) -> None:
+    def _check_numbers(self, family: ChoosingFamily, axes: list[tuple[float, ...]], path: KeyPath) -> None:
         """Check that numbers of a catalog are whole, and in a box from one range for all."""
         numbers = [axes[number] for number, _ in family.slots]
-        if isinstance(rows, SampledDesigns) or any(value != round(value) for axis in numbers for value in axis):
+        if any(value != round(value) for axis in numbers for value in axis):
             self.sources.refuse(
                 Fault((*path, "colorant_1"), "colorants have whole numbers", None, "a list of them, or a grid")
             )
@@ -285,7 +279,7 @@ def _check_formed(space: Space, path: KeyPath) -> Iterator[Fault]:
         yield Fault((*path, name), "a value twice", None, "different values")
     if space.filter is None or isinstance(space.filter.family, PluginFamily):
         return
-    if isinstance(space.rows, PairedDesigns):
+    if space.listed:
         beyond = float(space.violation(space.points(0, space.size)).min())
     else:  # the conditions are linear, each least at a corner
         low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
@@ -298,16 +292,11 @@ def _check_formed(space: Space, path: KeyPath) -> Iterator[Fault]:
         yield Fault(path, problem, None, "left edges before right ones, at both ends of the edges")
 
 
-def _sweep_axes(sweep: SweepSection, seed: int) -> tuple[str, dict[str, tuple[float, ...]], ListedDesigns | None]:
-    """Return the key of a sweep's parameters, their values, and its designs where they are no grid."""
-    if sweep.grid is not None:
-        return "grid", {name: axis.points() for name, axis in sweep.grid.items()}, None
-    if sweep.box is not None:
-        method: Method = "sobol" if sweep.sobol is not None else "lhs"
-        drawn = SampledDesigns(method, sweep.sobol or sweep.lhs or 0, seed)
-        return "box", {name: axis.points() for name, axis in sweep.box.items()}, drawn
-    if sweep.paired is not None:
-        columns = {name: axis.points() for name, axis in sweep.paired.items()}
-        return "zip", columns, PairedDesigns(max(map(len, columns.values())))
-    designs = sweep.listed or []
-    return "list", {name: tuple(design[name] for design in designs) for name in designs[0]}, PairedDesigns(len(designs))
+def with_listed_designs(section: StudySection, sources: Sources) -> StudySection:
+    """Return the study with the designs of sweeps that are in files."""
+    sweeps = dict(section.sweeps)
+    for name, sweep in section.sweeps.items():
+        if isinstance(sweep.values, str):
+            designs = sources.designs(("sweeps", name, "values"), sweep.values)
+            sweeps[name] = sweep.model_copy(update={"values": designs})
+    return section.model_copy(update={"sweeps": sweeps})

@@ -32,10 +32,15 @@ sweeps:
   edges:
     {cfa: RYNCy, channel: N, base: Y, to: G,
      grid: {left_nm: [590, 610, 630], left_width_nm: [5, 20], right_nm: [640, 650, 690], right_width_nm: 10}}
-  drawn: {cfa: RYNCy, channel: N, base: Y, to: G, sobol: 9, box: {left_nm: {min: 580, max: 630}, right_nm: {min: 635, max: 690}}}
+  drawn: {cfa: RYNCy, channel: N, base: Y, to: G, values: [VALUES]}
 constraints:
   sensitivity: {min: 0.9}
 """
+VALUES = ", ".join(
+    f"{{left_nm: {580 + 6 * at}, left_width_nm: {4 + at}, right_nm: {690 - 5 * at}, right_width_nm: 8}}"
+    for at in range(9)
+)
+STUDY = STUDY.replace("VALUES", VALUES)
 N_SWEPT = 2 * (18 + 9)
 
 

@@ -12,7 +12,6 @@ import pandas as pd
 import pytest
 
 from sweep.base.types import in_turn
-from sweep.designs.ungridded import PairedDesigns
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.metrics.quantity import DN, Quantity
@@ -59,7 +58,7 @@ def swept_rows(study: Study) -> pd.DataFrame:
     """Rows of a sweep of the box."""
     problem, rules = study.problem(study.search), rules_of(study)
     points = problem.from_unit(np.array(list(product(*GRID))))
-    space = replace(study.search.space, axes=tuple(map(tuple, points.T)), rows=PairedDesigns(len(points)))
+    space = replace(study.search.space, axes=tuple(map(tuple, points.T)), listed=len(points))
     at = np.arange(len(points))
     return rows_of(Rows(space, "scene", at, at, at), study.setup(space, "scene"), rules, rules.wanted).to_pandas()
 

@@ -1,19 +1,20 @@
-"""Sweeps that are no grid: drawn, paired and listed designs."""
+"""Sweeps that are no grid: listed designs, in the study or in a file."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
-from scipy.stats import qmc
 
-from sweep.study import load_study
+from sweep.runs.provenance import resolved_yaml
+from sweep.study import Study, load_study
 
-from ..build import one_line, stopband_study
+from ..build import load, one_line, stopband_study
 
-BOX = "{left_nm: {min: 560, max: 620}, left_width_nm: 10, right_nm: {min: 630, max: 690}, right_width_nm: {min: 5, max: 25}}"
-LOW, HIGH = np.array([560.0, 630.0, 5.0]), np.array([620.0, 690.0, 25.0])
+NAMES = ["right_nm", "left_nm", "left_width_nm", "right_width_nm"]
+DESIGNS = [[650, 600, 10, 5], [660, 610, 10, 5], [670, 620.5, 10, 5]]
 
 
 def written(folder: Path, keys: str, before: str = "wavelengths: {step_nm: 5}\n") -> Path:
@@ -23,58 +24,39 @@ def written(folder: Path, keys: str, before: str = "wavelengths: {step_nm: 5}\n"
     return path
 
 
-def points(folder: Path, keys: str, before: str = "") -> np.ndarray:
-    space = next(space for space in load_study(written(folder, keys, before)).spaces if space.kind == "sweep")
-    return space.points(0, space.size)
+def points(study: Study) -> np.ndarray:
+    space = next(space for space in study.spaces if space.kind == "sweep")
+    every = space.points(0, space.size)
+    np.testing.assert_array_equal(space.points(1, space.size), every[1:])
+    return every
 
 
-@pytest.mark.parametrize("method", ["sobol", "lhs"])
-def test_a_design_depends_on_its_number_and_the_seed_alone(tmp_path: Path, method: str) -> None:
-    keys = f"{method}: 1000\n    box: {BOX}"
-    space = next(space for space in load_study(written(tmp_path, keys)).spaces if space.kind == "sweep")
-    every = space.points(0, 1000)
-    assert np.unique(every, axis=0).shape == (1000, 5)
-    for start, stop in ((0, 1), (333, 600), (999, 1000)):
-        np.testing.assert_array_equal(space.points(start, stop), every[start:stop])
-    np.testing.assert_array_equal(points(tmp_path, keys), every)
-    assert (points(tmp_path, keys, "seed: 2\n") != every).any()
-    assert (every[:, [1, 4]] == [10, 1]).all()
-    shares = (every[:, [0, 2, 3]] - LOW) / (HIGH - LOW)
-    assert 0 <= shares.min() <= shares.max() <= 1
-    random = np.random.default_rng(0).random(shares.shape)
-    assert qmc.discrepancy(shares) < qmc.discrepancy(random)
-    if method == "lhs":
-        np.testing.assert_array_equal(np.sort(np.floor(shares * 1000), axis=0), np.arange(1000)[:, None].repeat(3, 1))
-    else:
-        np.testing.assert_array_equal(points(tmp_path, f"sobol: 100\n    box: {BOX}"), every[:100])
-
-
-def test_zip_and_list_take_values_together(tmp_path: Path) -> None:
-    paired = points(
-        tmp_path,
-        "zip: {left_nm: [600, 610, 620], right_nm: {min: 650, max: 670, count: 3}, left_width_nm: 10, right_width_nm: 5}",
-    )
-    expected = [[600, 10, 650, 5, 1], [610, 10, 660, 5, 1], [620, 10, 670, 5, 1]]
-    np.testing.assert_array_equal(paired, expected)
-    designs = ", ".join(
-        f"{{right_nm: {right}, left_nm: {left}, left_width_nm: 10, right_width_nm: 5}}"
-        for left, _, right, _, _ in expected
-    )
-    np.testing.assert_array_equal(points(tmp_path, f"list: [{designs}]"), expected)
+def test_listed_designs_are_taken_one_by_one_also_from_a_file(tmp_path: Path) -> None:
+    expected = [[left, left_width, right, right_width, 1] for right, left, left_width, right_width in DESIGNS]
+    designs = ", ".join(str(dict(zip(NAMES, design, strict=True))).replace("'", "") for design in DESIGNS)
+    np.testing.assert_array_equal(points(load_study(written(tmp_path, f"values: [{designs}]"))), expected)
+    pd.DataFrame(DESIGNS, columns=NAMES).to_csv(tmp_path / "drawn.csv", index=False)
+    of_file = load_study(written(tmp_path, "values: drawn.csv"))
+    np.testing.assert_array_equal(points(of_file), expected)
+    assert set(of_file.digests) == {"drawn.csv"}
+    (tmp_path / "drawn.csv").unlink()  # a run keeps the designs
+    np.testing.assert_array_equal(points(load(tmp_path, resolved_yaml(of_file))), expected)
 
 
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ("sobol: 10", "yaml:7: sweeps.edges: `box` goes with"),
-        (f"box: {BOX}", "one of `grid`, `sobol`, `lhs`, `zip`, `list`; there is none"),
-        (f"sobol: 0\n    box: {BOX}", "yaml:12: sweeps.edges.sobol: not allowed (got 0)"),
-        ("zip: {left_nm: [1, 2], right_nm: [1, 2, 3]}", "left_nm 2, right_nm 3"),
-        ("list: []", "list: one design or more"),
-        ("list: [{left_nm: 600}, {right_nm: 5}]", "design 2 names other parameters"),
-        ("sobol: 4\n    box: {left_nm: {min: 3, max: 4}}", "yaml:13: sweeps.edges.box.left_nm: out of range (got 3.0)"),
+        ("values: []", "yaml:12: sweeps.edges.values: too few entries (got 0)"),
+        ("values: [{left_nm: 600}, {right_nm: 5}]", "design 2 names other parameters"),
+        ("values: none.csv", "yaml:12: sweeps.edges.values: no such file"),
+        ("values: words.csv", "yaml:12: sweeps.edges.values: words.csv: could not convert string to float"),
+        ("values: gaps.csv", "gaps.csv: designs that cannot be used (got 2); allowed: 1 to 10,000 designs"),
+        ("technology: pigment", "one of `grid` and `values`; there is none of them"),
+        ("values: [{left_nm: 3, left_width_nm: 1, right_nm: 650, right_width_nm: 1}]", "out of range (got 3.0)"),
     ],
 )
 def test_invalid_sweep_is_one_line(tmp_path: Path, keys: str, said: str) -> None:
+    (tmp_path / "words.csv").write_text("left_nm,right_nm\n600,x\n")
+    (tmp_path / "gaps.csv").write_text("left_nm,right_nm\n600,650\n610,\n")
     with one_line(said, alone=False):
         load_study(written(tmp_path, keys))

@@ -167,7 +167,7 @@ def _measure(setup: Setup, space: Space, numbers: DesignNumbers) -> Measured:
 
 def _warm_up(setup: Setup, space: Space) -> None:
     """Load what a measurement imports and its machine code: a chart, and the scene itself behind another lens."""
-    single = replace(space, axes=tuple(axis[:1] for axis in space.axes), gridded=True, rows=None)
+    single = replace(space, axes=tuple(axis[:1] for axis in space.axes), gridded=True, listed=0)
     optics = setup.scene.optics.model_copy(update={"f_number": 1.1 * setup.scene.optics.f_number})
     elsewhere = setup.scene.model_copy(update={"optics": optics})
     chart = elsewhere.model_copy(update={"target": None, "field": None})
