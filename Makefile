@@ -67,7 +67,7 @@ docs: $(VENV)/.ready-docs
 	$(BIN)/python -m sphinx -q -W --keep-going -c studies/guide . outputs/docs
 	@echo "Documentation: outputs/docs/studies/guide/index.html"
 
-bench: $(VENV)/.ready-bench
+bench: $(VENV)/.ready-dev
 	$(ONE_THREAD) $(BIN)/python tests/bench_ratios.py
 	$(ONE_THREAD) $(BIN)/python tests/bench.py $(ARGS)
 	$(ONE_THREAD) $(BIN)/python tests/bench_search.py $(ARGS)
@@ -109,8 +109,3 @@ $(VENV)/.ready-docs: pyproject.toml | $(VENV)/bin/python
 	$(INSTALLING)
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
 	@touch $@ $(VENV)/.ready
-
-$(VENV)/.ready-bench: pyproject.toml | $(VENV)/bin/python
-	$(INSTALLING)
-	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,bench]'
-	@touch $@ $(VENV)/.ready $(VENV)/.ready-dev
