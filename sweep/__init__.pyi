@@ -16,6 +16,7 @@ from .features.audit.audit import audit
 from .features.compare.compare import compare
 from .features.describe.describe import describe
 from .features.export.export import export
+from .features.validate.validate import bench_template, validate
 from .features.vision.export_images import export_images
 from .features.vision.image_files import images
 from .features.vision.score import scores
@@ -43,6 +44,7 @@ __all__ = [
     "WavelengthGrid",
     "__version__",
     "audit",
+    "bench_template",
     "check",
     "compare",
     "describe",
@@ -65,4 +67,5 @@ __all__ = [
     "show",
     "status",
     "studies",
+    "validate",
 ]

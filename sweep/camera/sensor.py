@@ -30,7 +30,7 @@ class SensorCurves:
     `qe`: QE by curve name, electrons per photon, or on one common relative scale; `clear`: curve that the CFA
     sensitivity is relative to: the clear pixel, or the brightest curve; `surrogate`: True for modeled curves;
     `has_clear`: True if `clear` is a pixel without a filter. `variants`: for a CFA, channels that use a curve with
-    another name.
+    another name. `ir_cut`: its transmission, where known; `bare`: the sensor without one that a study adds, and that.
     """
 
     name: str
@@ -42,6 +42,7 @@ class SensorCurves:
     technologies: Mapping[str, Technology | None] = field(default_factory=dict)
     has_clear: bool = True
     ir_cut: PerWavelength | None = None
+    bare: tuple[SensorCurves, PerWavelength] | None = None
 
     @property
     def brightest(self) -> str:

@@ -30,6 +30,7 @@ FEATURES = (
     "sensors",
     "tasks",
     "tiles",
+    "validate",
     "vision",
 )
 

@@ -29,8 +29,7 @@ def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
     """Construct the sensor of a study.
 
     Relative curves of files are multiplied by their reference, which is built in or QE from a file. A channel with a
-    file
-    replaces that of the built-in sensor.
+    file replaces that of the built-in sensor.
 
     Raises StudyError: with every issue so far, if the study cannot be used.
     """
@@ -53,7 +52,7 @@ def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
     if values is None:
         return None
     qe = {name: curve * values for name, curve in sensor.qe.items()}
-    return replace(sensor, qe=qe, source=f"{sensor.source}, behind {section.ir_cut}")
+    return replace(sensor, qe=qe, source=f"{sensor.source}, behind {section.ir_cut}", bare=(sensor, values))
 
 
 def _sensor(section: SensorSection, sources: Sources) -> SensorCurves | None:

@@ -1,0 +1,270 @@
+"""A camera before uniform lights: what it should read, and the unknowns with which that is nearest to what it read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+
+from ...base.errors import DataError, ValidationIssue
+from ...base.types import Array, Bool, BoolArray, Float, PerFree, PerWavelength
+from ...camera.pixel import Pixel, unquantized
+from ...camera.setup import Setup
+from ...study import Study
+
+UNKNOWNS = {
+    "black": ("black level", "DN", "readings of the lamp `dark`, or of a lamp at two exposures"),
+    "gain": ("gain", "DN/e", "`sigma_dn` and `pixels`, or an irradiance"),
+    "shift": ("shift of the IR cut", "nm", "lamps with light where the IR cut falls"),
+    "crosstalk": ("crosstalk", "%", "more lamps, or channels"),
+    "read_noise": ("read noise", "e", "`sigma_dn` and `pixels` of dark readings"),
+}
+"""What is fitted beside the light of each lamp: in words, its unit, and what tells it."""
+ODD = 0.01
+"""Probability of the residuals below which the model is called wrong."""
+_ROUNDS = 3
+_UNTOLD, _PART = 1e-6, 0.1
+"""Least singular value of the readings' derivatives, relative to the largest; least part of an untold unknown in it."""
+_DITHERED_DN = 0.5
+"""Noise from which on rounding adds 1/12 DN^2 to its variance, whatever the mean."""
+_BAND_NM, _CHANGE = 20.0, 0.05
+"""Width of the bands in which a QE may be wrong, and by how much it usually is."""
+_FAR_BETTER = 0.05
+"""Share of the misfit that is left where channels were exchanged in the table."""
+_Readings = Float[Array, " readings"]
+_Residuals = Float[Array, " residuals"]
+_All = Float[Array, " unknowns"]
+"""Black level, DN; gain, DN/e; shift, nm; crosstalk; variance of the read noise, e^2; photons/s of each light."""
+
+
+def tells_noise(table: pd.DataFrame) -> Bool[BoolArray, " readings"]:
+    """Return which readings tell the noise of a value."""
+    return np.asarray((table["sigma_dn"] >= _DITHERED_DN) & (table["pixels"] > 1))
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Readings that count, and the camera that they are of.
+
+    `table`: readings with numbers of light, -1 for the dark, and place; `left_out`: other readings; `lights`: names;
+    `photons`: spectra of the lights, which integrate to 1, times the bins; `bare`: curves without the IR cut, as they
+    are, and `seen`, as each light sees them in the cone of rays of its scene; `cut`: transmission of the IR cut,
+    1 where none is known; `own`, `around`: shares of the channels in the light of a place that comes through its own
+    filter, and through those of its neighbors; `first`: unknowns as the study or the table say them; `free`: those that
+    are fitted.
+    """
+
+    study: Study
+    setup: Setup
+    table: pd.DataFrame
+    left_out: pd.DataFrame
+    lights: Sequence[str]
+    photons: Float[Array, "lights wavelengths"]
+    bare: Float[Array, "channels wavelengths"]
+    seen: Float[Array, "lights channels wavelengths"]
+    cut: PerWavelength
+    own: Float[Array, "places channels"]
+    around: Float[Array, "places channels"]
+    first: _All
+    free: Bool[BoolArray, " unknowns"]
+
+    @property
+    def pixel(self) -> Pixel:
+        """Pixel of the study."""
+        return self.setup.camera.pixel
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all unknowns."""
+        return [*UNKNOWNS, *self.lights]
+
+    @cached_property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Columns of the readings."""
+        columns = {str(name): column.to_numpy() for name, column in self.table.items()}
+        return columns | {"noise": tells_noise(self.table)}
+
+    def with_fitted(self, x: PerFree) -> _All:
+        """Return all unknowns from those that are fitted."""
+        unknowns = self.first.copy()
+        unknowns[self.free] = x
+        return unknowns
+
+    def moved(self, shift_nm: float) -> PerWavelength:
+        """Return the transmission of the IR cut, shifted to longer wavelengths."""
+        wave = self.study.grid.nodes_nm
+        return np.asarray(np.interp(wave - shift_nm, wave, self.cut), dtype=float)
+
+    def lit(self, unknowns: _All, seen: Float[Array, "lights channels"]) -> _Readings:
+        """Return electrons of the lamps in the readings, from what channels see of a photon of them."""
+        crosstalk, of = unknowns[3], self.arrays
+        places = seen @ ((1 - crosstalk) * self.own + crosstalk * self.around).T
+        rates = np.vstack([places * unknowns[5:, None], np.zeros(len(self.own))])  # the last row is that of number -1
+        return np.asarray(rates[of["light"], of["place"]] * of["exposure_s"])
+
+    def moments(self, unknowns: _All) -> tuple[_Readings, _Readings]:
+        """Return mean and variance of the values of the readings."""
+        black, gain, shift_nm, _, read_e2 = unknowns[:5]
+        seen = np.einsum("lw,lcw->lc", self.photons * self.moved(shift_nm), self.seen)
+        electrons = self.lit(unknowns, seen) + self.pixel.dark_e_per_s * self.arrays["exposure_s"]
+        mean = unquantized(electrons, self.pixel.model_copy(update={"gain_dn_per_e": gain, "offset_dn": black}))
+        return mean, gain**2 * (electrons + read_e2) + 1 / 12
+
+    def sigma_dn(self, unknowns: _All) -> _Readings:
+        """Return the standard deviation of the means: noise, unequal gains of pixels, and rounding of little noise."""
+        mean, variance = self.moments(unknowns)
+        unequal = (self.pixel.prnu * (mean - unknowns[0])) ** 2
+        undithered = np.exp(-4 * np.pi**2 * (variance - 1 / 12)) / (2 * np.pi**2)
+        return np.asarray(np.sqrt((variance + unequal) / np.fmax(self.arrays["pixels"], 1) + undithered))
+
+    def residuals(self, x: PerFree, sigma_dn: _Readings) -> _Residuals:
+        """Return what is left of means, then of variances, whose cube root is nearly normal (Wilson, Hilferty 1931)."""
+        mean, variance = self.moments(self.with_fitted(x))
+        of, at = self.arrays, self.arrays["noise"]
+        spread = 2 / (9 * (of["pixels"][at] - 1))
+        of_noise = (np.cbrt(of["sigma_dn"][at] ** 2 / variance[at]) - (1 - spread)) / np.sqrt(spread)
+        return np.concatenate([(of["dn"] - mean) / sigma_dn, of_noise])
+
+    @cached_property
+    def start(self) -> _All:
+        """Unknowns as they are said, and lights with which each lamp is as bright as it was read."""
+        unit = np.where(self.free & (np.arange(self.first.size) >= 5), 1.0, self.first)
+        mean, _ = self.moments(unit)
+        unit_dn, read_dn = mean - unit[0], np.maximum(self.arrays["dn"] - unit[0], 0.5)
+        for at in np.flatnonzero(self.free[5:]):
+            mine = self.arrays["light"] == at
+            unit[5 + at] = unit_dn[mine] @ read_dn[mine] / max(unit_dn[mine] @ unit_dn[mine], 1e-99)
+        return unit
+
+    def exchanged(self) -> tuple[int, int] | None:
+        """Return two channels whose readings are far more alike those of the study when exchanged."""
+        n, best = self.own.shape[1], (_FAR_BETTER * self._misfit, (-1, -1))
+        for one, other in combinations(range(n), 2):
+            order = np.arange(n)
+            order[[one, other]] = other, one
+            exchanged = replace(self, own=self.own[:, order], around=self.around[:, order])
+            best = min(best, (exchanged._misfit, (one, other)))
+        return None if best[1][0] < 0 else best[1]
+
+    @property
+    def _misfit(self) -> float:
+        mean, variance = self.moments(self.start)
+        return float(np.sum((self.arrays["dn"] - mean) ** 2 / variance))
+
+    def fitted(self) -> Fit:
+        """Return the fit; raises DataError for an unknown that the readings do not tell."""
+        from scipy.optimize import least_squares  # noqa: PLC0415  (slow to import)
+
+        low = np.array([-np.inf, 1e-9, -np.inf, *np.zeros(self.first.size - 3)])[self.free]
+        high = np.where(np.arange(self.first.size) == 3, 0.8, np.inf)[self.free]
+        x = np.clip(self.start[self.free], low, high)
+        if x.size >= len(self.table) + self.arrays["noise"].sum():
+            problem = "as many unknowns as readings: nothing is left to check"
+            raise DataError(ValidationIssue(problem, value=x.size, allowed="more readings, or unknowns to hold"))
+        for _ in range(_ROUNDS):
+            sigma_dn = self.sigma_dn(self.with_fitted(x))
+            found = least_squares(self.residuals, x, "3-point", (low, high), x_scale="jac", args=(sigma_dn,))
+            self._refuse_untold(found.jac)
+            x = found.x
+        return Fit(self, x, found.fun, found.jac, sigma_dn)
+
+    def _refuse_untold(self, jacobian: Float[Array, "residuals free"]) -> None:
+        """Raise DataError for unknowns that others can replace in all readings."""
+        numbers, size = np.flatnonzero(self.free), np.linalg.norm(jacobian, axis=0)
+        rows = np.vstack([jacobian / np.where(size > 0, size, 1), np.zeros((size.size, size.size))])  # as many, or more
+        _, singular, directions = np.linalg.svd(rows, full_matrices=False)
+        untold = numbers[size == 0].tolist()
+        for direction in directions[singular <= _UNTOLD * singular[0]]:
+            untold += numbers[np.abs(direction) > _PART][:1].tolist()
+        lit = self.table[self.table["light"] >= 0]
+        exposures = lit.groupby(["light", "place"])["exposure_s"].nunique()
+        if self.free[0] and len(lit) == len(self.table) and not (exposures > 1).any():
+            untold.append(0)
+        if untold:
+            raise DataError([self._untold(number) for number in dict.fromkeys(untold)])
+
+    def _untold(self, number: int) -> ValidationIssue:
+        name = self.names[number]
+        if name not in UNKNOWNS:
+            allowed = "an irradiance, or brighter readings"
+            return ValidationIssue("the readings do not tell its light", key=name, allowed=allowed)
+        words, _, tells = UNKNOWNS[name]
+        return ValidationIssue(f"the readings do not tell the {words}", key=name, allowed=f"{tells}; or --hold {name}")
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What fits best; residuals over `sigma_dn`, and their derivatives."""
+
+    bench: Bench
+    x: PerFree
+    residuals: _Residuals
+    jacobian: Float[Array, "residuals free"]
+    sigma_dn: _Readings
+
+    @cached_property
+    def unknowns(self) -> _All:
+        """All unknowns, fitted or not."""
+        return self.bench.with_fitted(self.x)
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom."""
+        return self.residuals.size - self.x.size
+
+    @property
+    def chi2(self) -> float:
+        """Sum of the squared residuals."""
+        return float(self.residuals @ self.residuals)
+
+    @cached_property
+    def p(self) -> float:
+        """Probability of a larger sum where the model is right."""
+        from scipy.stats import chi2  # noqa: PLC0415  (slow to import)
+
+        return float(chi2.sf(self.chi2, self.freedom))
+
+    @cached_property
+    def values(self) -> dict[str, tuple[float, float, float]]:
+        """Value of each unknown and the ends of its 95 % interval, NaN where it is held.
+
+        Where the model is wrong, intervals are wider by what it leaves.
+        """
+        from scipy.stats import t  # noqa: PLC0415  (slow to import)
+
+        more, half = self.chi2 / self.freedom if self.p < ODD else 1.0, np.full(self.unknowns.size, np.nan)
+        variances = np.diag(np.linalg.inv(self.jacobian.T @ self.jacobian)) * more
+        half[self.bench.free] = np.sqrt(variances) * t.ppf(0.975, self.freedom)
+        ends = np.stack([self.unknowns, self.unknowns - half, self.unknowns + half])
+        ends[1:, 3] = np.maximum(ends[1:, 3], 0.0)
+        ends[:, 4] = np.sqrt(np.maximum(ends[:, 4], 0.0))
+        return {name: tuple(ends[:, at].tolist()) for at, name in enumerate(self.bench.names)}
+
+    def mended(self) -> tuple[float, int, float, float]:
+        """Return the channel whose likeliest change of QE takes most of chi-square away.
+
+        How much that is, less what chance takes; the channel; nm in the middle of the band that does most; relative
+        change there. Changes of bands of 20 nm are independent, and 5 % of the QE each before anything is seen.
+        """
+        bench, wave = self.bench, self.bench.study.grid.nodes_nm
+        told, _ = np.linalg.qr(self.jacobian)
+        band = ((wave - wave[0]) // _BAND_NM).astype(int)
+        n_bands, found = band[-1] + 1, []
+        light = (bench.photons * bench.moved(self.unknowns[2]))[:, None] * bench.seen
+        for channel in range(bench.own.shape[1]):
+            columns = np.zeros((self.residuals.size, n_bands))
+            for at in range(n_bands):
+                seen = np.zeros(light.shape[:2])
+                seen[:, channel] = light[:, channel, band == at].sum(axis=1)
+                columns[: self.sigma_dn.size, at] = self.unknowns[1] * bench.lit(self.unknowns, seen) / self.sigma_dn
+            columns -= told @ (told.T @ columns)
+            precision = columns.T @ columns + np.eye(n_bands) / _CHANGE**2
+            change = np.linalg.solve(precision, columns.T @ self.residuals)
+            gained = float(self.residuals @ columns @ change - np.linalg.slogdet(precision * _CHANGE**2)[1])
+            best = int(np.argmax(np.abs(change) * np.linalg.norm(columns, axis=0)))
+            found.append((gained, channel, float(wave[band == best].mean()), float(change[best])))
+        return max(found)

@@ -1,0 +1,151 @@
+"""What is said of a validation: a sentence, tables, a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...report.numbers import SHARE, digits
+from ...report.page import Report, plain
+from ...report.panels import GAIN, LOSS, Panel, Points, Section, axis_over
+from ...report.tables import Axis, Column, Marks, Table
+from .bench import ODD, UNKNOWNS
+from .from_study import CAUSES
+from .validation import Validation
+
+_TINY = 1e-6
+_MOST_SIGMAS = 3.0
+"""A residual beyond is marked."""
+_RATIO = "over the brightest"
+
+
+def sentence(found: Validation) -> str:
+    """Return the answer; `**` around what decides."""
+    fit, within = found.fit, found.shown["residual"].abs().max()
+    cfa, sigmas = fit.bench.setup.camera.mosaic.name, np.sqrt(fit.chi2 / fit.freedom)
+    text = f"The study predicts {cfa}'s readings within **{100 * within:.2g} %** ({sigmas:.2g} sigma): "
+    if fit.p >= ODD:
+        return f"{text}**no reason to doubt the model** (p = {fit.p:.2g})."
+    text += f"**the model is wrong** (p {f'= {fit.p:.2g}' if fit.p > _TINY else f'< {_TINY:g}'})."
+    if (mended := facts(found)["mends_most"]) is not None:
+        how = f"{100 * abs(mended['change']):.2g} % {'higher' if mended['change'] > 0 else 'lower'} than the study's"
+        text += (
+            f" One curve mends most: **{mended['channel']}**, where it is {how} around {mended['middle_nm']:.0f} nm."
+        )
+    return text
+
+
+def remarks(found: Validation) -> list[str]:
+    """Return the separation of the lamps, and how many readings count and why others do not."""
+    bench, fit, said = found.fit.bench, found.fit, list[str]()
+    if (apart := found.separation) is not None:
+        ends = [digits(apart.measured_dn + sign * apart.half_width_dn, 4) for sign in (-1, 1)]
+        measured, predicted = " to ".join(ends), digits(apart.predicted_dn, 4)
+        name, scene = "/".join(apart.types), bench.table["scene"].iloc[0]
+        said.append(f"Separation {name} of these lamps in {scene}: measured {measured} DN, predicted {predicted} DN.")
+    left_out = bench.left_out["left_out"].value_counts()
+    others = "".join(f"; {size} left out {cause}" for cause, size in left_out.items())
+    said.append(f"{len(bench.table)} readings{others}; chi-square {fit.chi2:.1f} at {fit.freedom} degrees of freedom.")
+    return said
+
+
+def unknowns(found: Validation) -> Table:
+    """Return what was fitted, beside what the study says."""
+    rows, bench = {}, found.fit.bench
+    of_study = [*bench.first[:4], np.sqrt(bench.first[4])]
+    for (name, (words, unit, _)), said in zip(UNKNOWNS.items(), of_study, strict=True):
+        numbers = [*found.fit.values[name], said]
+        if np.isfinite(numbers).all():
+            texts = [f"{digits(100 * number if unit == '%' else number, 4)} {unit}" for number in numbers]
+            rows[words] = dict(zip(("value", "low", "high", "study"), texts, strict=True))
+    columns = {"value": Column("fitted"), "low": Column("from", group="95 %"), "high": Column("to", group="95 %")}
+    return Table({**columns, "study": Column("study")}, rows, head="unknown")
+
+
+def lamps(found: Validation) -> Table:
+    """Return readings by lamp and place, and their ratios to the brightest place, which no scale of a lamp hides."""
+    shown = found.shown.reset_index()
+    most = max(0.01, float(shown["residual"].abs().max()))
+    shown["ratio"] = shown["signal_dn"] / shown["exposure_s"]
+    top = shown.loc[shown.groupby("light")["ratio"].idxmax()].set_index("light")
+    rows: dict[str, dict[str, Any]] = {}
+    for row in shown.to_dict("records"):
+        best, sigmas = top.loc[row["light"]], row["residual"] / row["sigma"]
+        ratio, of_top = row["ratio"] / best["ratio"], row["place"] != best["place"]
+        measured = ratio * (1 + row["residual"]) / (1 + best["residual"])
+        color = LOSS if abs(sigmas) > _MOST_SIGMAS else GAIN
+        rows[f"{Path(found.fit.bench.lights[row['light']]).name} {row['channel']}"] = {
+            "exposure": row["exposure_s"],
+            "measured": row["dn"],
+            "predicted": row["predicted_dn"],
+            "residual": Marks(points=[(row["residual"], color)], text=f"{100 * row['residual']:+.2f} %"),
+            "sigmas": f"{sigmas:+.1f}",
+            "ratio": f"{measured:.4f}" if of_top else "",
+            "of_study": f"{ratio:.4f}" if of_top else "",
+        }
+    columns = {
+        "exposure": Column("exposure", "s"),
+        "measured": Column("measured", "DN"),
+        "predicted": Column("predicted", "DN"),
+        "residual": Column("residual", axis=Axis("residual", SHARE, -most, most)),
+        "sigmas": Column("sigma"),
+        "ratio": Column("measured", group=_RATIO),
+        "of_study": Column("predicted", group=_RATIO),
+    }
+    return Table(columns, rows, head="lamp and place")
+
+
+def lines(found: Validation) -> list[str]:
+    """Return the answer for a terminal."""
+    return [plain(sentence(found)), *remarks(found), "", *unknowns(found).lines, "", *lamps(found).lines]
+
+
+def report(found: Validation, file: str) -> Report:
+    """Return the page."""
+    bench, note = found.fit.bench, "The light of each lamp was fitted, too, where the table does not state it."
+    lead = Section("Lamps and places", lamps(found), (*_panels(found),), note=remarks(found)[-1])
+    held = [words for (words, *_), free in zip(UNKNOWNS.values(), bench.free, strict=False) if not free]
+    conditions = [
+        ("camera", f"{bench.setup.camera.mosaic.name} of {bench.study.name}"),
+        ("readings", file),
+        ("held as the study says", ", ".join(held) or "nothing"),
+    ]
+    method = [("method", "least squares over means, and over the noise where it was read; intervals of 95 %")]
+    answer = " ".join([sentence(found), *remarks(found)[:-1]])
+    sections = [Section("What was fitted", unknowns(found), note=note)]
+    return Report("validate", f"Readings against {bench.study.name}", answer, lead, sections, conditions, method, [])
+
+
+def _panels(found: Validation) -> Iterator[Panel]:
+    lit = found.rows[found.rows["light"] >= 0]
+    signal, share = lit["dn"] - found.fit.unknowns[0], lit["residual_dn"] / lit["signal_dn"]
+    across = axis_over("measured signal", "DN", signal, zero=False)
+    predicted = axis_over("predicted signal", "DN", lit["signal_dn"], zero=False)
+    for title, up, of in (
+        ("Predicted over measured", predicted, lit["signal_dn"]),
+        ("Residual over measured", axis_over("residual", SHARE, share, zero=False, log=False), share),
+    ):
+        places = lit.groupby("channel").groups.items()
+        groups = {str(place): (signal[at].to_numpy(), of[at].to_numpy()) for place, at in places}
+        yield Points(title, across, up, groups=groups)
+
+
+def facts(found: Validation) -> dict[str, Any]:
+    """Return the answer as plain values."""
+    fit, bench = found.fit, found.fit.bench
+    gained, channel, middle_nm, change = fit.mended()
+    wrong = {"channel": bench.setup.camera.mosaic.channels[channel], "middle_nm": middle_nm, "change": change}
+    return {
+        "cfa": bench.setup.camera.mosaic.name,
+        "within": float(found.shown["residual"].abs().max()),
+        "chi2": fit.chi2,
+        "degrees_of_freedom": fit.freedom,
+        "p": fit.p,
+        "unknowns": {name: dict(zip(("value", "low", "high"), fit.values[name], strict=True)) for name in UNKNOWNS},
+        "mends_most": wrong if fit.p < ODD and gained > 0 else None,
+        "separation": None if found.separation is None else found.separation._asdict(),
+        "left_out": {cause: int((bench.left_out["left_out"] == cause).sum()) for cause in CAUSES},
+    }
