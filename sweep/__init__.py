@@ -4,7 +4,7 @@ Three lines of Python evaluate a filter:
 
 >>> import sweep
 >>> study = sweep.load_study("stopband")
->>> dn = study.evaluate(N=0.95 * study.curve("Y")).csd_yellow_red
+>>> dn = study.evaluate(N=0.95 * study.curve("Y")).csd_yellow_red[0]
 
 What the commands of `sweep` do, functions of their names do, too: `sweep.run("stopband")` returns what it prints. `new`
 is `new_study`, `list` is `list_studies`, `open` is `show`; `read_run(...).report()` draws a report again.
@@ -49,6 +49,8 @@ _LOCATIONS = public() | {
 }
 """Public name to the module that defines it, and its name there."""
 
+_OF_STUDIES = ("Pixel", "Optics", "Scene", "Target", "WavelengthGrid")
+"""Sections of a study, whose keys have docstrings of their own."""
 __all__ = [*_LOCATIONS, "__version__"]  # noqa: PLE0604  (all of them are texts)
 
 
@@ -60,6 +62,8 @@ def __getattr__(name: str) -> object:
 
     module, _, attribute = _LOCATIONS[name].partition(":")
     value = globals()[name] = getattr(import_module(f".{module}", __name__), attribute)
+    if name in _OF_STUDIES:
+        value.__doc__ = import_module(".base.types", __name__).with_keys(value)
     return value
 
 

@@ -39,33 +39,7 @@ _OF_A_RUN = ("manifest.json", "provenance.json")
 
 @dataclass(frozen=True)
 class EvaluateOptions:
-    """Options of `evaluate`; values that are None follow from the file or the run.
-
-    Parameters
-    ----------
-    column : str, optional
-        Column of the file with the filter.
-    channel, cfa : str, optional
-        Channel of a CFA that the filter is for.
-    base : str, optional
-        Curve that the filter replaces.
-    sensor : str
-        A built-in sensor, or a file of QE curves.
-    lights : str, optional
-        A built-in data set, or a file of spectra.
-    quantity : str or sequence of str, optional
-        Units where the heads of files do not tell them: of the filter ``qe``, ``responsivity``,
-        ``relative_responsivity``, ``transmission``, ``density`` or ``decibel``; of lights ``energy`` or ``photons``.
-    relative_to : str, optional
-        The file holds transmissions, to be multiplied by this curve; left out, transmissions are those of a filter on
-        the curve that it replaces.
-    transmission : bool
-        The file holds transmissions of the clear pixel.
-    data : path-like, optional
-        Folder of a run's files.
-    allow_code : bool
-        Permit the code that the run was made with to run.
-    """
+    """Options of `evaluate`, as it says them; values that are None follow from the file or the run."""
 
     column: str | None = None
     channel: str | None = None
@@ -101,13 +75,18 @@ def evaluate(source: Path | str, *, design: str | int | None = None, **options: 
     design : str or int, optional
         A design of the run: a `filter_id`, a name (paper_N4, RGGB), or ``best`` (default).
     **options
-        Fields of `EvaluateOptions`: column, channel, cfa, base, sensor, lights, quantity, relative_to, transmission;
-        for a run also data and allow_code.
+        Left out, they follow from the file, or are those of the run. ``column`` of the file; ``cfa`` and ``channel``
+        that the filter is for, ``base``, the curve that it replaces; ``sensor`` (default ar0820) and ``lights`` (tl16),
+        built in or a file; ``quantity``, units that heads do not tell (``qe``, ``transmission``, ``density``, ...);
+        ``relative_to``, the curve that its transmissions are multiplied by; ``transmission=True``, the clear pixel's;
+        for a run ``data``, the folder of its files, and ``allow_code``. A filter of a file is held against the
+        constraints of the shipped study ``stopband``.
 
     Returns
     -------
     FilterEvaluation
-        ``table``, ``limit`` and ``gap``; printed, it is the text of `sweep evaluate`.
+        ``table`` of the CFAs, ``upper_bound``, DN (or ``no_upper_bound``, why there is none), ``gap`` to it, relative
+        to it (0 to 1), ``violated`` constraints of ``of_study``; printed, it is the text of `sweep evaluate`.
 
     Raises
     ------

@@ -136,8 +136,8 @@ class FilterEvaluation:
     @cached_property
     def table(self) -> pd.DataFrame:
         """Quantities with one row per scenario and CFA; units and meanings are in ``attrs``."""
-        study = self.study
-        return table_of_results(study, [(cfa, cfa, scene, columns) for scene, cfa, columns in self.rows])
+        table = table_of_results(self.study, [(cfa, cfa, scene, columns) for scene, cfa, columns in self.rows])
+        return table.drop(columns=["violation", "feasible", "violated"])  # these CFAs have no constraints
 
     @property
     def gap(self) -> float | None:

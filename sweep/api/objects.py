@@ -45,7 +45,7 @@ class LoadedStudy:
     Parameters
     ----------
     study : Study
-        The study as the other subpackages use it.
+        The study as the other subpackages use it: ``pixel``, ``scenarios``, ``constraints``, ``mosaics``, ``spaces``.
 
     Examples
     --------
@@ -112,7 +112,7 @@ class LoadedStudy:
 
     @property
     def lights(self) -> pd.DataFrame:
-        """Photons per nm of every signal, normalized to a sum of one; columns are (signal type, name), the index nm."""
+        """Photons per nm of every signal, which integrate to one; columns are (signal type, name), the index nm."""
         from pandas import MultiIndex
 
         lights = self.study.lights
@@ -151,9 +151,11 @@ class LoadedStudy:
         Returns
         -------
         pandas.DataFrame
-            One row per scenario and filter, with every quantity of the study; units and meanings are in ``attrs``.
-            Quantities that only the parameters of a family determine are NaN; if one of them is constrained, the filter
-            is not feasible.
+            One row per scenario and filter: ``name`` (a plain CFA has its own), ``cfa``, ``scenario``, parameters of
+            the family, every quantity of the study, ``violation``, ``feasible`` and ``violated`` (constraints that are
+            not met). ``attrs["units"][column]`` and ``attrs["meanings"][column]`` say what a quantity is. What the
+            filter does not determine is NaN: figures of a plain CFA's filter, or of a curve's parameters; if one of
+            them is constrained, the row is not feasible.
 
         Raises
         ------

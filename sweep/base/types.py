@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
+from textwrap import dedent
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
@@ -129,6 +133,32 @@ def with_keys_of_features(section: type[_Section]) -> type[_Section]:
     return create_model(
         section.__name__, __base__=(*added, section), __module__=section.__module__, __doc__=section.__doc__
     )
+
+
+def key_texts(owners: Iterable[type]) -> dict[str, str]:
+    """Return the docstrings below the keys of sections, by name."""
+    texts = {}
+    for owner in owners:
+        if not issubclass(owner, Section):
+            continue
+        try:
+            source = dedent(inspect.getsource(owner))
+        except OSError:  # pydantic's `create_model` made it
+            continue
+        for key, text in pairwise(ast.parse(source).body[0].body):  # type: ignore[attr-defined]  # a class
+            match key, text:
+                case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(words))):
+                    texts[name] = inspect.cleandoc(words)
+    return texts
+
+
+def with_keys(section: type[Section]) -> str:
+    """Return the docstring of a section with its keys, for `help`."""
+    texts, keys = key_texts(reversed(section.__mro__)), list[str]()
+    for name, field in section.model_fields.items():
+        default = "" if field.is_required() else f", default {field.default!r}"
+        keys.append(f"{name}{default}\n    " + texts[name].replace("\n", "\n    "))
+    return "\n".join([inspect.cleandoc(section.__doc__ or ""), "", "Parameters", "----------", *keys])
 
 
 def from_to(value: Any) -> Any:

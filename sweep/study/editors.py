@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from copy import deepcopy
-from itertools import pairwise
-from textwrap import dedent
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from ..base.types import Section
+from ..base.types import key_texts
 from ..designs.registry import FAMILIES, FamilyOptions
 from .schema import StudySection
 
@@ -33,7 +29,9 @@ class _Described(GenerateJsonSchema):
         """Add the descriptions; pydantic would read all sources whenever the package is imported."""
         described, section = super().model_schema(schema), schema["cls"]
         options = [family.Options for family in FAMILIES.values()] if issubclass(section, FamilyOptions) else []
-        texts = _key_texts([*options, *reversed(section.__mro__)])
+        texts = key_texts([*options, *reversed(section.__mro__)])
+        if "description" in described:  # without the keys that `help` shows
+            described["description"] = described["description"].partition("\n\nParameters\n")[0]
         for name, field in section.model_fields.items():
             if name in texts:
                 described["properties"][field.alias or name]["description"] = texts[name]
@@ -42,23 +40,6 @@ class _Described(GenerateJsonSchema):
     def field_title_should_be_set(self, schema: core_schema.CoreSchema | Any) -> bool:  # noqa: ARG002  (pydantic's)
         """Return False."""
         return False
-
-
-def _key_texts(owners: Iterable[type]) -> dict[str, str]:
-    """Return the docstrings below the keys of sections, by name."""
-    texts = {}
-    for owner in owners:
-        if not issubclass(owner, Section):
-            continue
-        try:
-            source = dedent(inspect.getsource(owner))
-        except OSError:  # pydantic's `create_model` made it
-            continue
-        for key, text in pairwise(ast.parse(source).body[0].body):  # type: ignore[attr-defined]  # a class
-            match key, text:
-                case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(words))):
-                    texts[name] = inspect.cleandoc(words)
-    return texts
 
 
 def study_schema() -> Json:

@@ -10,6 +10,7 @@ import sys
 import pytest
 
 import sweep
+from sweep.study.editors import study_schema
 
 from ..conftest import ROOT
 
@@ -42,3 +43,9 @@ def test_nothing_is_loaded_before_a_name_is_used() -> None:
 def test_examples_in_the_code_run(name: str) -> None:
     module = __import__(f"sweep.api.{name}", fromlist=[name])
     assert doctest.testmod(module).failed == 0
+
+
+def test_help_of_a_section_says_its_keys() -> None:
+    assert sweep.Target.__doc__ is not None
+    assert "distance_m\n    Distance, m." in sweep.Target.__doc__
+    assert "Parameters" not in study_schema()["$defs"]["Target"]["description"]

@@ -51,8 +51,8 @@ class FreeForm(Family):
 
     Notes
     -----
-    = base times transmission, which is piecewise linear between nodes and 1 outside them. N is linear in
-    its parameters.
+    N = base times transmission, which is piecewise linear between nodes and 1 outside them. N is linear in its
+    parameters.
 
     Parameters
     ----------
@@ -62,8 +62,8 @@ class FreeForm(Family):
         QE of the replaced curve.
     nodes_nm : ndarray of shape (n_nodes,)
         Nodes, nm.
-    off : ProductionError
-        Production error.
+    production_error : ProductionError
+        What production makes of the filter; left out, nothing.
     """
 
     kind = "free_form"

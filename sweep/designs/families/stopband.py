@@ -24,9 +24,8 @@ class MultiStopband(Banded):
 
     Notes
     -----
-    = base + sum over bands of depth (target - base) (e(l; left) - e(l; right)). With edges in order, bands
-    do not overlap, so that N lies between base and target at every wavelength, and equals the base outside
-    the bands.
+    N = base + sum over bands of depth (target - base) (e(l; left) - e(l; right)). With edges in order, bands do not
+    overlap, so that N lies between base and target at every wavelength, and equals the base outside the bands.
 
     Parameters
     ----------

@@ -27,9 +27,11 @@ UNKNOWNS = {
 ODD = 0.01
 """Probability of the residuals below which the model is called wrong."""
 _ROUNDS = 3
+_MOST_SHIFT_NM, _MOST_ERROR_NM = 50.0, 2.0
+"""Largest shift, and largest standard deviation of one: an interval as wide as the edge of the IR cut says nothing."""
 _UNTOLD, _PART = 1e-6, 0.1
 """Least singular value of the readings' derivatives, relative to the largest; least part of an untold unknown in it."""
-_DITHERED_DN = 0.5
+_DITHERED_DN = 0.7
 """Noise from which on rounding adds 1/12 DN^2 to its variance, whatever the mean."""
 _BAND_NM, _CHANGE = 20.0, 0.05
 """Width of the bands in which a QE may be wrong, and by how much it usually is."""
@@ -44,6 +46,12 @@ _All = Float[Array, " unknowns"]
 def tells_noise(table: pd.DataFrame) -> Bool[BoolArray, " readings"]:
     """Return which readings tell the noise of a value."""
     return np.asarray((table["sigma_dn"] >= _DITHERED_DN) & (table["pixels"] > 1))
+
+
+def _step(numbers: _Readings) -> float:
+    """Return the step to which all numbers of a column are rounded; 0 for none."""
+    steps = (step for step in (1.0, 0.1, 0.01) if np.allclose(numbers / step, np.rint(numbers / step), 0, 1e-6))
+    return next(steps, 0.0)
 
 
 @dataclass(frozen=True)
@@ -115,18 +123,19 @@ class Bench:
         return mean, gain**2 * (electrons + read_e2) + 1 / 12
 
     def sigma_dn(self, unknowns: _All) -> _Readings:
-        """Return the standard deviation of the means: noise, unequal gains of pixels, and rounding of little noise."""
+        """Return the standard deviation of the means: noise, unequal gains, rounding of readings and of the table."""
         mean, variance = self.moments(unknowns)
         unequal = (self.pixel.prnu * (mean - unknowns[0])) ** 2
-        undithered = np.exp(-4 * np.pi**2 * (variance - 1 / 12)) / (2 * np.pi**2)
-        return np.asarray(np.sqrt((variance + unequal) / np.fmax(self.arrays["pixels"], 1) + undithered))
+        rounding = np.exp(-4 * np.pi**2 * (variance - 1 / 12)) / (2 * np.pi**2) + _step(self.arrays["dn"]) ** 2 / 12
+        return np.asarray(np.sqrt((variance + unequal) / np.fmax(self.arrays["pixels"], 1) + rounding))
 
     def residuals(self, x: PerFree, sigma_dn: _Readings) -> _Residuals:
         """Return what is left of means, then of variances, whose cube root is nearly normal (Wilson, Hilferty 1931)."""
         mean, variance = self.moments(self.with_fitted(x))
         of, at = self.arrays, self.arrays["noise"]
-        spread = 2 / (9 * (of["pixels"][at] - 1))
-        of_noise = (np.cbrt(of["sigma_dn"][at] ** 2 / variance[at]) - (1 - spread)) / np.sqrt(spread)
+        noise_dn, spread = of["sigma_dn"][at], 2 / (9 * (of["pixels"][at] - 1))
+        rounding = (_step(noise_dn) / noise_dn) ** 2 / 27
+        of_noise = (np.cbrt(noise_dn**2 / variance[at]) - (1 - spread)) / np.sqrt(spread + rounding)
         return np.concatenate([(of["dn"] - mean) / sigma_dn, of_noise])
 
     @cached_property
@@ -159,8 +168,8 @@ class Bench:
         """Return the fit; raises DataError for an unknown that the readings do not tell."""
         from scipy.optimize import least_squares  # noqa: PLC0415  (slow to import)
 
-        low = np.array([-np.inf, 1e-9, -np.inf, *np.zeros(self.first.size - 3)])[self.free]
-        high = np.where(np.arange(self.first.size) == 3, 0.8, np.inf)[self.free]
+        low = np.array([-np.inf, 1e-9, -_MOST_SHIFT_NM, *np.zeros(self.first.size - 3)])[self.free]
+        high = np.array([np.inf, np.inf, _MOST_SHIFT_NM, 0.8, *np.full(self.first.size - 4, np.inf)])[self.free]
         x = np.clip(self.start[self.free], low, high)
         if x.size >= len(self.table) + self.arrays["noise"].sum():
             problem = "as many unknowns as readings: nothing is left to check"
@@ -168,8 +177,8 @@ class Bench:
         for _ in range(_ROUNDS):
             sigma_dn = self.sigma_dn(self.with_fitted(x))
             found = least_squares(self.residuals, x, "3-point", (low, high), x_scale="jac", args=(sigma_dn,))
-            self._refuse_untold(found.jac)
             x = found.x
+        self._refuse_untold(found.jac)
         return Fit(self, x, found.fun, found.jac, sigma_dn)
 
     def _refuse_untold(self, jacobian: Float[Array, "residuals free"]) -> None:
@@ -180,6 +189,9 @@ class Bench:
         untold = numbers[size == 0].tolist()
         for direction in directions[singular <= _UNTOLD * singular[0]]:
             untold += numbers[np.abs(direction) > _PART][:1].tolist()
+        if not untold and self.free[2]:
+            variances = np.diag(np.linalg.inv(jacobian.T @ jacobian))
+            untold += numbers[(numbers == 2) & (variances > _MOST_ERROR_NM**2)].tolist()
         lit = self.table[self.table["light"] >= 0]
         exposures = lit.groupby(["light", "place"])["exposure_s"].nunique()
         if self.free[0] and len(lit) == len(self.table) and not (exposures > 1).any():
@@ -193,7 +205,9 @@ class Bench:
             allowed = "an irradiance, or brighter readings"
             return ValidationIssue("the readings do not tell its light", key=name, allowed=allowed)
         words, _, tells = UNKNOWNS[name]
-        return ValidationIssue(f"the readings do not tell the {words}", key=name, allowed=f"{tells}; or --hold {name}")
+        return ValidationIssue(
+            f"the readings do not tell the {words}", key=name, allowed=f"{tells}; or hold it (--hold {name})"
+        )
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ...base.errors import SweepError, ValidationIssue
-from ...cli.options import OF_STUDIES, AllowCode, DataFolder, StudyPath
+from ...cli.options import OF_STUDIES, AllowCode, Changes, DataFolder, StudyPath, changes_of
 from ...cli.output import Json, Quiet, print_answer
 
 PANEL = OF_STUDIES
@@ -31,6 +31,7 @@ def validate(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder for the page.", show_default="outputs/validate-NAME")
     ] = None,
+    changes: Changes = None,
     data: DataFolder = None,
     allow_code: AllowCode = False,
     as_json: Json = False,
@@ -41,13 +42,22 @@ def validate(
     from .validate import validate as validated
 
     if template is not None:
-        print_answer(bench_template(study, template, data=data, allow_code=allow_code), as_json=as_json, quiet=quiet)
+        made = bench_template(study, template, changes=changes_of(changes), data=data, allow_code=allow_code)
+        print_answer(made, as_json=as_json, quiet=quiet)
         return
     if readings is None:
         raise SweepError(
             ValidationIssue("missing", key="READINGS", allowed="a table, or --template FILE for a new one")
         )
     answer = validated(
-        study, readings, cfa=cfa, hold=hold or (), output=output, corrected=corrected, data=data, allow_code=allow_code
+        study,
+        readings,
+        cfa=cfa,
+        hold=hold or (),
+        output=output,
+        corrected=corrected,
+        changes=changes_of(changes),
+        data=data,
+        allow_code=allow_code,
     )
     print_answer(answer, as_json=as_json, quiet=quiet)

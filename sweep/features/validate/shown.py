@@ -100,7 +100,8 @@ def lamps(found: Validation) -> Table:
 
 def lines(found: Validation) -> list[str]:
     """Return the answer for a terminal."""
-    return [plain(sentence(found)), *remarks(found), "", *unknowns(found).lines, "", *lamps(found).lines]
+    tables = [table.lines for table in (unknowns(found), lamps(found)) if table.rows]
+    return [plain(sentence(found)), *remarks(found), *(line for table in tables for line in ("", *table))]
 
 
 def report(found: Validation, file: str) -> Report:

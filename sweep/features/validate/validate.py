@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ def validate(
     hold: Sequence[str] = (),
     output: Path | str | None = None,
     corrected: Path | str | None = None,
+    changes: Mapping[str, Any] | None = None,
     data: Path | str | None = None,
     allow_code: bool = False,
 ) -> Answer:
@@ -46,7 +47,8 @@ def validate(
     study : path-like, or LoadedStudy
         The study of the camera.
     readings : path-like or pandas.DataFrame
-        A row for each reading: ``lamp`` (a light of the study, FILE:COLUMN, or ``dark``), ``channel`` (or ``row`` and
+        A row for each reading: ``lamp`` (a light of the study, the second level of `LoadedStudy.lights`, FILE:COLUMN
+        or ``dark``), ``channel`` (or ``row`` and
         ``column`` in the tile, from 0), ``exposure_s``, ``dn`` (mean); optionally ``sigma_dn`` (temporal noise of a
         value), ``pixels`` (values in the mean), ``scene``, ``irradiance (W/m2)`` or ``irradiance (photons/s/m2)`` on
         the sensor.
@@ -58,6 +60,8 @@ def validate(
         Folder of page and table; left out, outputs/validate-NAME.
     corrected : path-like, optional
         New file for the curves behind the shifted IR cut.
+    changes : mapping of str to object
+        Keys of the study, and values instead of the file's.
     data : path-like, optional
         Folder that the study's files are looked for in first.
     allow_code : bool
@@ -66,14 +70,25 @@ def validate(
     Returns
     -------
     Answer
-        How well the readings are predicted, the unknowns with 95 % intervals, and the curve that is likely to be wrong.
+        How well the readings are predicted. ``facts`` has ``p`` (0 to 1: of residuals as large as these where the model
+        is right), ``within`` (largest residual of a lamp and place, relative), ``unknowns`` (of each name of ``hold``
+        its ``value`` and the ends ``low`` and ``high`` of its 95 % interval, NaN where it is held: DN, DN/e, nm, a
+        share, e), ``mends_most`` (channel, wavelength and relative change of the curve that is likely to be wrong),
+        ``separation`` (DN), ``chi2``, ``degrees_of_freedom`` and ``left_out``.
 
     Raises
     ------
     SweepError
         For faults of the table, each with its line, unknowns that the readings do not tell, and exchanged channels.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> answer = sweep.validate("mine.yaml", "readings.csv", hold=["crosstalk"])  # doctest: +SKIP
+    >>> answer.facts["unknowns"]["gain"]["value"]  # doctest: +SKIP
+    0.4007
     """
-    loaded = _loaded(study, data, allow_code=allow_code)
+    loaded = _loaded(study, data, changes, allow_code=allow_code)
     for name in hold:
         if name not in UNKNOWNS:
             known, near = ", ".join(UNKNOWNS), nearest(name, UNKNOWNS)
@@ -100,13 +115,18 @@ def validate(
 
 
 def bench_template(
-    study: Path | str | Any, file: Path | str, *, data: Path | str | None = None, allow_code: bool = False
+    study: Path | str | Any,
+    file: Path | str,
+    *,
+    changes: Mapping[str, Any] | None = None,
+    data: Path | str | None = None,
+    allow_code: bool = False,
 ) -> Answer:
     """Write a table of readings with the lamps and channels of a study, for numbers to be filled in.
 
     Parameters
     ----------
-    study, data, allow_code
+    study, changes, data, allow_code
         As for `validate`.
     file : path-like
         New table.
@@ -121,7 +141,7 @@ def bench_template(
     SweepError
         If the file exists, or cannot be written.
     """
-    loaded, path = _loaded(study, data, allow_code=allow_code), Path(file)
+    loaded, path = _loaded(study, data, changes, allow_code=allow_code), Path(file)
     if path.exists():
         raise SweepError(ValidationIssue("is there already, and stays as it is", str(path), allowed="another name"))
     channels = next(iter(loaded.mosaics.values())).channels
@@ -134,8 +154,11 @@ def bench_template(
     )
 
 
-def _loaded(study: Path | str | Any, data: Path | str | None, *, allow_code: bool) -> Study:
+def _loaded(
+    study: Path | str | Any, data: Path | str | None, changes: Mapping[str, Any] | None, *, allow_code: bool
+) -> Study:
     if isinstance(study, str | Path):
-        return load_study(study_path(Path(study)), None if data is None else Path(data), allow_code=allow_code)
+        folder = None if data is None else Path(data)
+        return load_study(study_path(Path(study)), folder, changes=changes or {}, allow_code=allow_code)
     loaded: Study = getattr(study, "study", study)
     return loaded
