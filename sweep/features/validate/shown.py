@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from ...report.numbers import SHARE, digits
 from ...report.page import Report, plain
-from ...report.panels import GAIN, LOSS, Panel, Points, Section, axis_over
+from ...report.panels import GAIN, LOSS, Points, Section, axis_over
 from ...report.tables import Axis, Column, Marks, Table
 from .bench import ODD, UNKNOWNS
 from .from_study import CAUSES
@@ -107,7 +106,7 @@ def lines(found: Validation) -> list[str]:
 def report(found: Validation, file: str) -> Report:
     """Return the page."""
     bench, note = found.fit.bench, "The light of each lamp was fitted, too, where the table does not state it."
-    lead = Section("Lamps and places", lamps(found), (*_panels(found),), note=remarks(found)[-1])
+    lead = Section("Lamps and places", lamps(found), (_panel(found),), note=remarks(found)[-1])
     held = [words for (words, *_), free in zip(UNKNOWNS.values(), bench.free, strict=False) if not free]
     conditions = [
         ("camera", f"{bench.setup.camera.mosaic.name} of {bench.study.name}"),
@@ -120,18 +119,14 @@ def report(found: Validation, file: str) -> Report:
     return Report("validate", f"Readings against {bench.study.name}", answer, lead, sections, conditions, method, [])
 
 
-def _panels(found: Validation) -> Iterator[Panel]:
+def _panel(found: Validation) -> Points:
+    """Return predicted over measured signals of each channel."""
     lit = found.rows[found.rows["light"] >= 0]
-    signal, share = lit["dn"] - found.fit.unknowns[0], lit["residual_dn"] / lit["signal_dn"]
-    across = axis_over("measured signal", "DN", signal, zero=False)
-    predicted = axis_over("predicted signal", "DN", lit["signal_dn"], zero=False)
-    for title, up, of in (
-        ("Predicted over measured", predicted, lit["signal_dn"]),
-        ("Residual over measured", axis_over("residual", SHARE, share, zero=False, log=False), share),
-    ):
-        places = lit.groupby("channel").groups.items()
-        groups = {str(place): (signal[at].to_numpy(), of[at].to_numpy()) for place, at in places}
-        yield Points(title, across, up, groups=groups)
+    measured, predicted = lit["dn"] - found.fit.unknowns[0], lit["signal_dn"]
+    across, up = axis_over("measured signal", "DN", measured), axis_over("predicted signal", "DN", predicted)
+    places = lit.groupby("channel").groups.items()
+    groups = {str(place): (measured[at].to_numpy(), predicted[at].to_numpy()) for place, at in places}
+    return Points("Predicted over measured", across, up, groups=groups)
 
 
 def facts(found: Validation) -> dict[str, Any]:
