@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -45,7 +46,7 @@ _All = Float[Array, " unknowns"]
 
 def tells_noise(table: pd.DataFrame) -> Bool[BoolArray, " readings"]:
     """Return which readings tell the noise of a value."""
-    return np.asarray((table["sigma_dn"] >= _DITHERED_DN) & (table["pixels"] > 1))
+    return np.asarray((table["sigma_dn"] >= _DITHERED_DN) & (table["pixels"] * table["frames"].fillna(1) > 1))
 
 
 def _step(numbers: _Readings) -> float:
@@ -94,7 +95,8 @@ class Bench:
     def arrays(self) -> dict[str, np.ndarray]:
         """Columns of the readings."""
         columns = {str(name): column.to_numpy() for name, column in self.table.items()}
-        return columns | {"noise": tells_noise(self.table)}
+        counts = {name: np.fmax(columns[name].astype(float), 1) for name in ("pixels", "frames")}
+        return columns | counts | {"noise": tells_noise(self.table)}
 
     def with_fitted(self, x: PerFree) -> _All:
         """Return all unknowns from those that are fitted."""
@@ -105,7 +107,13 @@ class Bench:
     def moved(self, shift_nm: float) -> PerWavelength:
         """Return the transmission of the IR cut, shifted to longer wavelengths."""
         wave = self.study.grid.nodes_nm
-        return np.asarray(np.interp(wave - shift_nm, wave, self.cut), dtype=float)
+        return np.asarray(np.maximum(self._spline(np.clip(wave - shift_nm, wave[0], wave[-1])), 0.0), dtype=float)
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import)
+
+        return CubicSpline(self.study.grid.nodes_nm, self.cut)
 
     def lit(self, unknowns: _All, seen: Float[Array, "lights channels"]) -> _Readings:
         """Return electrons of the lamps in the readings, from what channels see of a photon of them."""
@@ -125,17 +133,22 @@ class Bench:
     def sigma_dn(self, unknowns: _All) -> _Readings:
         """Return the standard deviation of the means: noise, unequal gains, rounding of readings and of the table."""
         mean, variance = self.moments(unknowns)
-        unequal = (self.pixel.prnu * (mean - unknowns[0])) ** 2
-        rounding = np.exp(-4 * np.pi**2 * (variance - 1 / 12)) / (2 * np.pi**2) + _step(self.arrays["dn"]) ** 2 / 12
-        return np.asarray(np.sqrt((variance + unequal) / np.fmax(self.arrays["pixels"], 1) + rounding))
+        of, unequal = self.arrays, (self.pixel.prnu * (mean - unknowns[0])) ** 2  # alike in all frames of a pixel
+        rounding = np.exp(-4 * np.pi**2 * (variance - 1 / 12)) / (2 * np.pi**2) + _step(of["dn"]) ** 2 / 12
+        return np.asarray(np.sqrt((variance / of["frames"] + unequal) / of["pixels"] + rounding))
 
-    def residuals(self, x: PerFree, sigma_dn: _Readings) -> _Residuals:
-        """Return what is left of means, then of variances, whose cube root is nearly normal (Wilson, Hilferty 1931)."""
+    def residuals(self, x: PerFree, sigma_dn: _Readings, variance_dn2: _Readings) -> _Residuals:
+        """Return what is left of means, then of variances, whose cube root is nearly normal (Wilson, Hilferty 1931).
+
+        `sigma_dn`, `variance_dn2`: their weights, which stay while unknowns change, or large noise would weigh less.
+        """
         mean, variance = self.moments(self.with_fitted(x))
         of, at = self.arrays, self.arrays["noise"]
-        noise_dn, spread = of["sigma_dn"][at], 2 / (9 * (of["pixels"][at] - 1))
+        frames, noise_dn = of["frames"][at], of["sigma_dn"][at]
+        freedom = np.where(frames > 1, of["pixels"][at] * (frames - 1), of["pixels"][at] - 1)
+        spread, weight = 2 / (9 * freedom), np.cbrt(variance_dn2[at])
         rounding = (_step(noise_dn) / noise_dn) ** 2 / 27
-        of_noise = (np.cbrt(noise_dn**2 / variance[at]) - (1 - spread)) / np.sqrt(spread + rounding)
+        of_noise = (np.cbrt(noise_dn**2) - np.cbrt(variance[at]) * (1 - spread)) / weight / np.sqrt(spread + rounding)
         return np.concatenate([(of["dn"] - mean) / sigma_dn, of_noise])
 
     @cached_property
@@ -176,7 +189,8 @@ class Bench:
             raise DataError(ValidationIssue(problem, value=x.size, allowed="more readings, or unknowns to hold"))
         for _ in range(_ROUNDS):
             sigma_dn = self.sigma_dn(self.with_fitted(x))
-            found = least_squares(self.residuals, x, "3-point", (low, high), x_scale="jac", args=(sigma_dn,))
+            weights = sigma_dn, self.moments(self.with_fitted(x))[1]
+            found = least_squares(self.residuals, x, "3-point", (low, high), x_scale="jac", args=weights)
             x = found.x
         self._refuse_untold(found.jac)
         return Fit(self, x, found.fun, found.jac, sigma_dn)
@@ -258,11 +272,12 @@ class Fit:
         ends[:, 4] = np.sqrt(np.maximum(ends[:, 4], 0.0))
         return {name: tuple(ends[:, at].tolist()) for at, name in enumerate(self.bench.names)}
 
-    def mended(self) -> tuple[float, int, float, float]:
+    def mended(self) -> tuple[float, int, float, float, float]:
         """Return the channel whose likeliest change of QE takes most of chi-square away.
 
         How much that is, less what chance takes; the channel; nm in the middle of the band that does most; relative
-        change there. Changes of bands of 20 nm are independent, and 5 % of the QE each before anything is seen.
+        change there; what is left of chi-square. Changes of bands of 20 nm are independent, and 5 % of the QE each
+        before anything is seen.
         """
         bench, wave = self.bench, self.bench.study.grid.nodes_nm
         told, _ = np.linalg.qr(self.jacobian)
@@ -278,7 +293,8 @@ class Fit:
             columns -= told @ (told.T @ columns)
             precision = columns.T @ columns + np.eye(n_bands) / _CHANGE**2
             change = np.linalg.solve(precision, columns.T @ self.residuals)
-            gained = float(self.residuals @ columns @ change - np.linalg.slogdet(precision * _CHANGE**2)[1])
+            taken = float(self.residuals @ columns @ change)
+            gained = taken - float(np.linalg.slogdet(precision * _CHANGE**2)[1])
             best = int(np.argmax(np.abs(change) * np.linalg.norm(columns, axis=0)))
-            found.append((gained, channel, float(wave[band == best].mean()), float(change[best])))
+            found.append((gained, channel, float(wave[band == best].mean()), float(change[best]), self.chi2 - taken))
         return max(found)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from ...base.errors import DataError, ValidationIssue, nearest
 from ...base.types import Array, Float, PerWavelength
 from ...camera.model import scene_model
 from ...camera.mosaic import Mosaic
+from ...camera.pixel import Pixel
 from ...camera.setup import Setup
 from ...spectra.formats import read_curves
 from ...spectra.spectrum import energy_from_photons, equal_photons, photons_from_energy, resample
@@ -32,8 +33,18 @@ _OF_A_LIGHT = ["lamp", "scene", "irradiance_w_m2", "irradiance_photons"]
 """What tells lights apart: each has one brightness."""
 
 
-def bench_of(study: Study, file: str, table: pd.DataFrame, cfa: str | None, hold: Sequence[str]) -> Bench:
-    """Return the bench of some readings. Raises DataError for lamps, places and scenes that are not known."""
+def bench_of(
+    study: Study,
+    file: str,
+    table: pd.DataFrame,
+    cfa: str | None,
+    hold: Sequence[str],
+    known: Mapping[str, float] | None = None,
+) -> Bench:
+    """Return the bench of some readings. Raises DataError for lamps, places and scenes that are not known.
+
+    `known`: numbers of the pixel by which readings near the ends of its range are left out, instead of the study's.
+    """
     table = table.assign(scene=table["scene"].replace("", next(iter(study.scenarios))))
     _refuse_unknown(file, table, "scene", study.scenarios)
     setups = {name: _setup(study, file, table, cfa, name) for name in dict.fromkeys(table["scene"])}
@@ -50,7 +61,8 @@ def bench_of(study: Study, file: str, table: pd.DataFrame, cfa: str | None, hold
     _refuse_unknown(file, table, "channel", places)
     spectra = _spectra(study, file, table[~dark])
 
-    table = table.assign(place=[places.index(name) for name in channel], left_out=_left_out(table, setup))
+    cause = _left_out(table, pixel.model_copy(update=known or {}))
+    table = table.assign(place=[places.index(name) for name in channel], left_out=cause)
     counted, left_out = table[table["left_out"] == ""], table[table["left_out"] != ""]
     if not len(counted):
         raise DataError(ValidationIssue("all readings are near full scale or near 0 DN", file, 1, "dn"))
@@ -110,9 +122,9 @@ def _shares(mosaic: Mosaic) -> tuple[list[str], Float[Array, "places channels"],
     return [*mosaic.channels, *(f"{row}, {column}" for row, column in np.ndindex(tile.shape))], own, around
 
 
-def _left_out(table: pd.DataFrame, setup: Setup) -> list[str]:
+def _left_out(table: pd.DataFrame, pixel: Pixel) -> list[str]:
     """Return why each reading does not count; empty for those that do."""
-    pixel, dn = setup.camera.pixel, table["dn"].to_numpy()
+    dn = table["dn"].to_numpy()
     gain, top_dn = pixel.dn_per_e, pixel.saturation_e * pixel.dn_per_e + pixel.offset_dn
     expected = gain * np.maximum(dn - pixel.offset_dn, 0) + (gain * pixel.read_noise_e) ** 2 + 1 / 12
     reach = _CERTAIN * np.fmax(table["sigma_dn"].to_numpy(), np.sqrt(expected))

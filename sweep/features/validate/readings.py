@@ -12,7 +12,7 @@ import pandas as pd
 
 from ...base.errors import DataError, ValidationIssue, nearest
 from ...spectra.facts import merge_equal_issues
-from ...spectra.read_text import MISSING, number_of, text_sheet
+from ...spectra.read_text import MISSING, Rows, number_of, text_sheet
 from ...spectra.units import folded
 
 DARK = "dark"
@@ -38,16 +38,17 @@ _FIELDS = {
     "dn_dn": _Field("dn"),
     "sigma_dn": _Field("sigma_dn"),
     "pixels": _Field("pixels", least=1, most=1e12, whole=True),
+    "frames": _Field("frames", least=1, most=1e9, whole=True),
     "row": _Field("row", whole=True),
     "column": _Field("column", whole=True),
-    "irradiance_w/m2": _Field("irradiance_w_m2", least=1e-30),
-    "irradiance_w_m2": _Field("irradiance_w_m2", least=1e-30),
-    "irradiance_mw/m2": _Field("irradiance_w_m2", 1e-3, 1e-30),
-    "irradiance_uw/cm2": _Field("irradiance_w_m2", 1e-2, 1e-30),
-    "irradiance_photons/s/m2": _Field("irradiance_photons", least=1e-30),
+    "irradiance_w/m2": _Field("irradiance_w_m2", least=1e-30, most=1e30),
+    "irradiance_w_m2": _Field("irradiance_w_m2", least=1e-30, most=1e30),
+    "irradiance_mw/m2": _Field("irradiance_w_m2", 1e-3, 1e-30, 1e30),
+    "irradiance_uw/cm2": _Field("irradiance_w_m2", 1e-2, 1e-30, 1e30),
+    "irradiance_photons/s/m2": _Field("irradiance_photons", least=1e-30, most=1e30),
 }
 """Heads of columns of numbers, with units as `exposure (ms)` or `exposure_ms`."""
-_OPTIONAL = ("sigma_dn", "pixels", "row", "column", "irradiance_w_m2", "irradiance_photons")
+_OPTIONAL = ("sigma_dn", "pixels", "frames", "row", "column", "irradiance_w_m2", "irradiance_photons")
 _HEAD = "lamp, channel (or row and column in the tile), exposure_s, dn"
 
 
@@ -56,14 +57,7 @@ def read_readings(readings: Path | str | pd.DataFrame) -> tuple[str, pd.DataFram
 
     Raises DataError with all faults, each with its line.
     """
-    if isinstance(readings, pd.DataFrame):
-        file = "readings"
-        rows = [(1, [str(head) for head in readings.columns])]
-        rows += [(at, [str(cell) for cell in row]) for at, row in enumerate(readings.itertuples(index=False), 2)]
-        decimal = "."
-    else:
-        sheet = text_sheet(Path(readings), f"a head with {_HEAD}, and a row for each reading")
-        file, rows, decimal = sheet.file, sheet.rows, sheet.decimal
+    file, rows, decimal = _cells(readings)
     (line, heads), *body = rows
     keys = [re.sub(r"[\s_()\[\]]+", "_", folded(head)).strip("_") for head in heads]
     issues = [*_faults_of_heads(file, line, heads, keys)]
@@ -100,6 +94,18 @@ def read_readings(readings: Path | str | pd.DataFrame) -> tuple[str, pd.DataFram
     return file, table
 
 
+def _cells(readings: Path | str | pd.DataFrame) -> tuple[str, Rows, str]:
+    """Return the name of a table, its rows of cells with their lines, and its decimal mark."""
+    if isinstance(readings, pd.DataFrame):
+        texts = readings.astype(object).where(readings.notna(), "").to_numpy()
+        lines = enumerate(texts, 2)
+        return "readings", [(1, [*map(str, readings)]), *((at, [*map(str, row)]) for at, row in lines)], "."
+    if not isinstance(readings, str | Path):
+        raise DataError(ValidationIssue("no table", value=type(readings).__name__, allowed="a file or a data frame"))
+    sheet = text_sheet(Path(readings), f"a head with {_HEAD}, and a row for each reading")
+    return sheet.file, sheet.rows, sheet.decimal
+
+
 def _number(cell: str, decimal: str) -> float:
     value = number_of(cell.replace(decimal, "."))
     return np.nan if value is None else value
@@ -116,6 +122,8 @@ def _faults_of_heads(file: str, line: int, heads: Sequence[str], keys: Sequence[
     for name in dict.fromkeys(names):
         if names.count(name) > 1:
             yield ValidationIssue("column occurs twice", file, line, name)
+    if {"irradiance_w_m2", "irradiance_photons"} <= {*names}:
+        yield ValidationIssue("two columns of irradiance", file, line)
     missing = [name for name in ("lamp", "exposure_s", "dn") if name not in names]
     if "channel" not in names and not {"row", "column"} <= {*names}:
         missing.append("channel")

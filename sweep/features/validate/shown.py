@@ -16,6 +16,8 @@ from .from_study import CAUSES
 from .validation import Validation
 
 _TINY = 1e-6
+_MUCH, _LARGE = 2.0, 0.3
+"""Chi-square a degree of freedom that a mended curve leaves, and change of a QE, that call for other reasons."""
 _MOST_SIGMAS = 3.0
 """A residual beyond is marked."""
 _RATIO = "over the brightest"
@@ -23,7 +25,7 @@ _RATIO = "over the brightest"
 
 def sentence(found: Validation) -> str:
     """Return the answer; `**` around what decides."""
-    fit, within = found.fit, found.shown["residual"].abs().max()
+    fit, within = found.fit, facts(found)["within"]
     cfa, sigmas = fit.bench.setup.camera.mosaic.name, np.sqrt(fit.chi2 / fit.freedom)
     text = f"The study predicts {cfa}'s readings within **{100 * within:.2g} %** ({sigmas:.2g} sigma): "
     if fit.p >= ODD:
@@ -31,9 +33,11 @@ def sentence(found: Validation) -> str:
     text += f"**the model is wrong** (p {f'= {fit.p:.2g}' if fit.p > _TINY else f'< {_TINY:g}'})."
     if (mended := facts(found)["mends_most"]) is not None:
         how = f"{100 * abs(mended['change']):.2g} % {'higher' if mended['change'] > 0 else 'lower'} than the study's"
-        text += (
-            f" One curve mends most: **{mended['channel']}**, where it is {how} around {mended['middle_nm']:.0f} nm."
-        )
+        at, left = f"around {mended['middle_nm']:.0f} nm", mended["chi2_left"]
+        text += f" One curve mends most: **{mended['channel']}**, where it is {how} {at}."
+        if left > _MUCH * fit.freedom or abs(mended["change"]) > _LARGE:
+            rest = f"chi-square {left:.0f} of {fit.chi2:.0f} is left"
+            text += f" But not all ({rest}): look at the spectra of lamps, exposures, and other curves."
     return text
 
 
@@ -132,11 +136,13 @@ def _panel(found: Validation) -> Points:
 def facts(found: Validation) -> dict[str, Any]:
     """Return the answer as plain values."""
     fit, bench = found.fit, found.fit.bench
-    gained, channel, middle_nm, change = fit.mended()
+    gained, channel, middle_nm, change, left = fit.mended()
     wrong = {"channel": bench.setup.camera.mosaic.channels[channel], "middle_nm": middle_nm, "change": change}
+    wrong["chi2_left"] = left
+    lit = found.rows[found.rows["light"] >= 0]
     return {
         "cfa": bench.setup.camera.mosaic.name,
-        "within": float(found.shown["residual"].abs().max()),
+        "within": float((lit["residual_dn"] / lit["signal_dn"]).abs().max()),
         "chi2": fit.chi2,
         "degrees_of_freedom": fit.freedom,
         "p": fit.p,

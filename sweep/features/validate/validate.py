@@ -20,6 +20,8 @@ from .readings import DARK, read_readings
 from .shown import facts, lines, report
 from .validation import Validation
 
+_PASSES = 3
+"""Most times that readings are chosen anew by the range of the pixel that was fitted."""
 _EXPOSURES_S = (0.003, 0.01)
 """Of a new table."""
 PAGE, ROWS = "validation.html", "validation.parquet"
@@ -48,10 +50,10 @@ def validate(
         The study of the camera.
     readings : path-like or pandas.DataFrame
         A row for each reading: ``lamp`` (a light of the study, the second level of `LoadedStudy.lights`, FILE:COLUMN
-        or ``dark``), ``channel`` (or ``row`` and
-        ``column`` in the tile, from 0), ``exposure_s``, ``dn`` (mean); optionally ``sigma_dn`` (temporal noise of a
-        value), ``pixels`` (values in the mean), ``scene``, ``irradiance (W/m2)`` or ``irradiance (photons/s/m2)`` on
-        the sensor.
+        or ``dark``), ``channel`` (or ``row`` and ``column`` in the tile, from 0), ``exposure_s``, ``dn`` (mean);
+        optionally ``sigma_dn`` (temporal noise of a value), ``pixels`` and ``frames`` of the mean (1: the noise is
+        over pixels; more: of each pixel over its frames), ``scene``, and ``irradiance (W/m2)`` or
+        ``irradiance (photons/s/m2)`` on the sensor.
     cfa : str, optional
         CFA of the camera; left out, the first that has curves for the channels.
     hold : sequence of str
@@ -89,6 +91,7 @@ def validate(
     0.4007
     """
     loaded = _loaded(study, data, changes, allow_code=allow_code)
+    hold = [hold] if isinstance(hold, str) else [*(hold or ())]
     for name in hold:
         if name not in UNKNOWNS:
             known, near = ", ".join(UNKNOWNS), nearest(name, UNKNOWNS)
@@ -99,7 +102,14 @@ def validate(
     if (pair := bench.exchanged()) is not None:
         problem = f"{channels[pair[0]]} and {channels[pair[1]]} look exchanged: so their readings fit"
         raise DataError(ValidationIssue(problem, file, 1, "channel", allowed="each reading with its channel"))
-    found = Validation(bench.fitted())
+    fit = bench.fitted()
+    for _ in range(_PASSES):
+        black, gain = fit.unknowns[:2].tolist()
+        bench = bench_of(loaded, file, table, cfa, hold, {"gain_dn_per_e": gain, "offset_dn": max(black, 0.0)})
+        if len(bench.table) == len(fit.bench.table):
+            break
+        fit = bench.fitted()
+    found = Validation(fit)
     to = Path("outputs") / f"validate-{loaded.name}" if output is None else Path(output)
     with atomic(to / ROWS) as hidden:
         found.rows.to_parquet(hidden, index=False)
@@ -160,5 +170,9 @@ def _loaded(
     if isinstance(study, str | Path):
         folder = None if data is None else Path(data)
         return load_study(study_path(Path(study)), folder, changes=changes or {}, allow_code=allow_code)
-    loaded: Study = getattr(study, "study", study)
+    loaded = getattr(study, "study", study)
+    if not isinstance(loaded, Study):
+        raise SweepError(
+            ValidationIssue("no study", value=type(study).__name__, allowed="a file, a name, a loaded study")
+        )
     return loaded

