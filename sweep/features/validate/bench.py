@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -25,8 +25,9 @@ UNKNOWNS = {
     "read_noise": ("read noise", "e", "`sigma_dn` and `pixels` of dark readings"),
 }
 """What is fitted beside the light of each lamp: in words, its unit, and what tells it."""
+_N = len(UNKNOWNS)
 ODD = 0.01
-"""Probability of the residuals below which the model is called wrong."""
+"""Probability of the residuals below which the readings do not fit the model."""
 _ROUNDS = 3
 _MOST_SHIFT_NM, _MOST_ERROR_NM = 50.0, 2.0
 """Largest shift, and largest standard deviation of one: an interval as wide as the edge of the IR cut says nothing."""
@@ -119,12 +120,12 @@ class Bench:
         """Return electrons of the lamps in the readings, from what channels see of a photon of them."""
         crosstalk, of = unknowns[3], self.arrays
         places = seen @ ((1 - crosstalk) * self.own + crosstalk * self.around).T
-        rates = np.vstack([places * unknowns[5:, None], np.zeros(len(self.own))])  # the last row is that of number -1
+        rates = np.vstack([places * unknowns[_N:, None], np.zeros(len(self.own))])  # the last row is that of number -1
         return np.asarray(rates[of["light"], of["place"]] * of["exposure_s"])
 
     def moments(self, unknowns: _All) -> tuple[_Readings, _Readings]:
         """Return mean and variance of the values of the readings."""
-        black, gain, shift_nm, _, read_e2 = unknowns[:5]
+        black, gain, shift_nm, _, read_e2 = unknowns[:_N]
         seen = np.einsum("lw,lcw->lc", self.photons * self.moved(shift_nm), self.seen)
         electrons = self.lit(unknowns, seen) + self.pixel.dark_e_per_s * self.arrays["exposure_s"]
         mean = unquantized(electrons, self.pixel.model_copy(update={"gain_dn_per_e": gain, "offset_dn": black}))
@@ -154,12 +155,12 @@ class Bench:
     @cached_property
     def start(self) -> _All:
         """Unknowns as they are said, and lights with which each lamp is as bright as it was read."""
-        unit = np.where(self.free & (np.arange(self.first.size) >= 5), 1.0, self.first)
+        unit = np.where(self.free & (np.arange(self.first.size) >= _N), 1.0, self.first)
         mean, _ = self.moments(unit)
         unit_dn, read_dn = mean - unit[0], np.maximum(self.arrays["dn"] - unit[0], 0.5)
-        for at in np.flatnonzero(self.free[5:]):
+        for at in np.flatnonzero(self.free[_N:]):
             mine = self.arrays["light"] == at
-            unit[5 + at] = unit_dn[mine] @ read_dn[mine] / max(unit_dn[mine] @ unit_dn[mine], 1e-99)
+            unit[_N + at] = unit_dn[mine] @ read_dn[mine] / max(unit_dn[mine] @ unit_dn[mine], 1e-99)
         return unit
 
     def exchanged(self) -> tuple[int, int] | None:
@@ -224,6 +225,19 @@ class Bench:
         )
 
 
+class Mended(NamedTuple):
+    """Change of a channel's QE: chi-square that it takes away, less what chance takes, and what it leaves.
+
+    `middle_nm`, `change`: middle of the band that does most, and relative change there.
+    """
+
+    gained: float
+    channel: int
+    middle_nm: float
+    change: float
+    chi2_left: float
+
+
 @dataclass(frozen=True)
 class Fit:
     """What fits best; residuals over `sigma_dn`, and their derivatives."""
@@ -246,12 +260,12 @@ class Fit:
 
     @property
     def chi2(self) -> float:
-        """Sum of the squared residuals."""
+        """Chi-square: the sum of the squared residuals."""
         return float(self.residuals @ self.residuals)
 
     @cached_property
     def p(self) -> float:
-        """Probability of a larger sum where the model is right."""
+        """Probability of a larger chi-square where the model is right."""
         from scipy.stats import chi2  # noqa: PLC0415  (slow to import)
 
         return float(chi2.sf(self.chi2, self.freedom))
@@ -260,7 +274,7 @@ class Fit:
     def values(self) -> dict[str, tuple[float, float, float]]:
         """Value of each unknown and the ends of its 95 % interval, NaN where it is held.
 
-        Where the model is wrong, intervals are wider by what it leaves.
+        Where the readings do not fit the model, intervals are wider by what it leaves.
         """
         from scipy.stats import t  # noqa: PLC0415  (slow to import)
 
@@ -272,17 +286,16 @@ class Fit:
         ends[:, 4] = np.sqrt(np.maximum(ends[:, 4], 0.0))
         return {name: tuple(ends[:, at].tolist()) for at, name in enumerate(self.bench.names)}
 
-    def mended(self) -> tuple[float, int, float, float, float]:
-        """Return the channel whose likeliest change of QE takes most of chi-square away.
+    @cached_property
+    def mended(self) -> Mended:
+        """Change of one channel's QE that takes most of chi-square away.
 
-        How much that is, less what chance takes; the channel; nm in the middle of the band that does most; relative
-        change there; what is left of chi-square. Changes of bands of 20 nm are independent, and 5 % of the QE each
-        before anything is seen.
+        Changes of bands of 20 nm are independent, and 5 % of the QE each before anything is seen.
         """
         bench, wave = self.bench, self.bench.study.grid.nodes_nm
         told, _ = np.linalg.qr(self.jacobian)
         band = ((wave - wave[0]) // _BAND_NM).astype(int)
-        n_bands, found = band[-1] + 1, []
+        n_bands, changes = band[-1] + 1, list[Mended]()
         light = (bench.photons * bench.moved(self.unknowns[2]))[:, None] * bench.seen
         for channel in range(bench.own.shape[1]):
             columns = np.zeros((self.residuals.size, n_bands))
@@ -296,5 +309,6 @@ class Fit:
             taken = float(self.residuals @ columns @ change)
             gained = taken - float(np.linalg.slogdet(precision * _CHANGE**2)[1])
             best = int(np.argmax(np.abs(change) * np.linalg.norm(columns, axis=0)))
-            found.append((gained, channel, float(wave[band == best].mean()), float(change[best]), self.chi2 - taken))
-        return max(found)
+            middle_nm = float(wave[band == best].mean())
+            changes.append(Mended(gained, channel, middle_nm, float(change[best]), self.chi2 - taken))
+        return max(changes)

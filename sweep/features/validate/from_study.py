@@ -15,6 +15,7 @@ from ...base.types import Array, Float, PerWavelength
 from ...camera.model import scene_model
 from ...camera.mosaic import Mosaic
 from ...camera.pixel import Pixel
+from ...camera.sampling import crosstalk_parts
 from ...camera.setup import Setup
 from ...spectra.formats import read_curves
 from ...spectra.spectrum import energy_from_photons, equal_photons, photons_from_energy, resample
@@ -115,7 +116,8 @@ def _shares(mosaic: Mosaic) -> tuple[list[str], Float[Array, "places channels"],
     """Return the places of readings, channels, then pixels of the tile, with the filters before them and around."""
     tile = mosaic.indices
     each = np.eye(len(mosaic.channels))[tile]
-    beside = np.mean([np.roll(each, step, axis) for axis in (0, 1) for step in (-1, 1)], axis=0)
+    parts = crosstalk_parts(1.0)
+    beside = np.sum([share * np.roll(each, (-down, -right), (0, 1)) for share, down, right in parts], axis=0)
     pixels = each.reshape(tile.size, -1)
     of_channels = (pixels / mosaic.counts).T
     own, around = (np.concatenate([of_channels @ of, of]) for of in (pixels, beside.reshape(tile.size, -1)))

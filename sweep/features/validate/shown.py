@@ -23,28 +23,29 @@ _MOST_SIGMAS = 3.0
 _RATIO = "over the brightest"
 
 
-def sentence(found: Validation) -> str:
+def sentence(validation: Validation) -> str:
     """Return the answer; `**` around what decides."""
-    fit, within = found.fit, facts(found)["within"]
-    cfa, sigmas = fit.bench.setup.camera.mosaic.name, np.sqrt(fit.chi2 / fit.freedom)
-    text = f"The study predicts {cfa}'s readings within **{100 * within:.2g} %** ({sigmas:.2g} sigma): "
+    fit, mended = validation.fit, validation.mended
+    mosaic, sigmas = fit.bench.setup.camera.mosaic, np.sqrt(fit.chi2 / fit.freedom)
+    text = f"The study, with what was fitted, predicts {mosaic.name}'s readings within "
+    text += f"**{100 * validation.within:.2g} %** ({sigmas:.2g} sigma): "
     if fit.p >= ODD:
         return f"{text}**no reason to doubt the model** (p = {fit.p:.2g})."
-    text += f"**the model is wrong** (p {f'= {fit.p:.2g}' if fit.p > _TINY else f'< {_TINY:g}'})."
-    if (mended := facts(found)["mends_most"]) is not None:
-        how = f"{100 * abs(mended['change']):.2g} % {'higher' if mended['change'] > 0 else 'lower'} than the study's"
-        at, left = f"around {mended['middle_nm']:.0f} nm", mended["chi2_left"]
-        text += f" One curve mends most: **{mended['channel']}**, where it is {how} {at}."
-        if left > _MUCH * fit.freedom or abs(mended["change"]) > _LARGE:
-            rest = f"chi-square {left:.0f} of {fit.chi2:.0f} is left"
+    text += f"**the readings do not fit the model** (p {f'= {fit.p:.2g}' if fit.p > _TINY else f'< {_TINY:g}'})."
+    if mended is not None:
+        how = f"{100 * abs(mended.change):.2g} % {'higher' if mended.change > 0 else 'lower'} than the study's"
+        at = f"around {mended.middle_nm:.0f} nm"
+        text += f" One curve mends most: **{mosaic.channels[mended.channel]}**, where it is {how} {at}."
+        if mended.chi2_left > _MUCH * fit.freedom or abs(mended.change) > _LARGE:
+            rest = f"chi-square {mended.chi2_left:.0f} of {fit.chi2:.0f} is left"
             text += f" But not all ({rest}): look at the spectra of lamps, exposures, and other curves."
     return text
 
 
-def remarks(found: Validation) -> list[str]:
+def remarks(validation: Validation) -> list[str]:
     """Return the separation of the lamps, and how many readings count and why others do not."""
-    bench, fit, said = found.fit.bench, found.fit, list[str]()
-    if (apart := found.separation) is not None:
+    bench, fit, said = validation.fit.bench, validation.fit, list[str]()
+    if (apart := validation.separation) is not None:
         ends = [digits(apart.measured_dn + sign * apart.half_width_dn, 4) for sign in (-1, 1)]
         measured, predicted = " to ".join(ends), digits(apart.predicted_dn, 4)
         name, scene = "/".join(apart.types), bench.table["scene"].iloc[0]
@@ -55,12 +56,12 @@ def remarks(found: Validation) -> list[str]:
     return said
 
 
-def unknowns(found: Validation) -> Table:
+def unknowns(validation: Validation) -> Table:
     """Return what was fitted, beside what the study says."""
-    rows, bench = {}, found.fit.bench
+    rows, bench = {}, validation.fit.bench
     of_study = [*bench.first[:4], np.sqrt(bench.first[4])]
     for (name, (words, unit, _)), said in zip(UNKNOWNS.items(), of_study, strict=True):
-        numbers = [*found.fit.values[name], said]
+        numbers = [*validation.fit.values[name], said]
         if np.isfinite(numbers).all():
             texts = [f"{digits(100 * number if unit == '%' else number, 4)} {unit}" for number in numbers]
             rows[words] = dict(zip(("value", "low", "high", "study"), texts, strict=True))
@@ -68,9 +69,9 @@ def unknowns(found: Validation) -> Table:
     return Table({**columns, "study": Column("study")}, rows, head="unknown")
 
 
-def lamps(found: Validation) -> Table:
+def lamps(validation: Validation) -> Table:
     """Return readings by lamp and place, and their ratios to the brightest place, which no scale of a lamp hides."""
-    shown = found.shown.reset_index()
+    shown = validation.shown.reset_index()
     most = max(0.01, float(shown["residual"].abs().max()))
     shown["ratio"] = shown["signal_dn"] / shown["exposure_s"]
     top = shown.loc[shown.groupby("light")["ratio"].idxmax()].set_index("light")
@@ -80,7 +81,7 @@ def lamps(found: Validation) -> Table:
         ratio, of_top = row["ratio"] / best["ratio"], row["place"] != best["place"]
         measured = ratio * (1 + row["residual"]) / (1 + best["residual"])
         color = LOSS if abs(sigmas) > _MOST_SIGMAS else GAIN
-        rows[f"{Path(found.fit.bench.lights[row['light']]).name} {row['channel']}"] = {
+        rows[f"{Path(validation.fit.bench.lights[row['light']]).name} {row['channel']}"] = {
             "exposure": row["exposure_s"],
             "measured": row["dn"],
             "predicted": row["predicted_dn"],
@@ -101,16 +102,16 @@ def lamps(found: Validation) -> Table:
     return Table(columns, rows, head="lamp and place")
 
 
-def lines(found: Validation) -> list[str]:
+def lines(validation: Validation) -> list[str]:
     """Return the answer for a terminal."""
-    tables = [table.lines for table in (unknowns(found), lamps(found)) if table.rows]
-    return [plain(sentence(found)), *remarks(found), *(line for table in tables for line in ("", *table))]
+    tables = [table.lines for table in (unknowns(validation), lamps(validation)) if table.rows]
+    return [plain(sentence(validation)), *remarks(validation), *(line for table in tables for line in ("", *table))]
 
 
-def report(found: Validation, file: str) -> Report:
+def report(validation: Validation, file: str) -> Report:
     """Return the page."""
-    bench, note = found.fit.bench, "The light of each lamp was fitted, too, where the table does not state it."
-    lead = Section("Lamps and places", lamps(found), (_panel(found),), note=remarks(found)[-1])
+    bench, note = validation.fit.bench, "The light of each lamp was fitted, too, where the table does not state it."
+    lead = Section("Lamps and places", lamps(validation), (_panel(validation),), note=remarks(validation)[-1])
     held = [words for (words, *_), free in zip(UNKNOWNS.values(), bench.free, strict=False) if not free]
     conditions = [
         ("camera", f"{bench.setup.camera.mosaic.name} of {bench.study.name}"),
@@ -118,36 +119,36 @@ def report(found: Validation, file: str) -> Report:
         ("held as the study says", ", ".join(held) or "nothing"),
     ]
     method = [("method", "least squares over means, and over the noise where it was read; intervals of 95 %")]
-    answer = " ".join([sentence(found), *remarks(found)[:-1]])
-    sections = [Section("What was fitted", unknowns(found), note=note)]
+    answer = " ".join([sentence(validation), *remarks(validation)[:-1]])
+    sections = [Section("What was fitted", unknowns(validation), note=note)]
     return Report("validate", f"Readings against {bench.study.name}", answer, lead, sections, conditions, method, [])
 
 
-def _panel(found: Validation) -> Points:
+def _panel(validation: Validation) -> Points:
     """Return predicted over measured signals of each channel."""
-    lit = found.rows[found.rows["light"] >= 0]
-    measured, predicted = lit["dn"] - found.fit.unknowns[0], lit["signal_dn"]
+    lit = validation.rows[validation.rows["light"] >= 0]
+    measured, predicted = lit["dn"] - validation.fit.unknowns[0], lit["signal_dn"]
     across, up = axis_over("measured signal", "DN", measured), axis_over("predicted signal", "DN", predicted)
     places = lit.groupby("channel").groups.items()
     groups = {str(place): (measured[at].to_numpy(), predicted[at].to_numpy()) for place, at in places}
     return Points("Predicted over measured", across, up, groups=groups)
 
 
-def facts(found: Validation) -> dict[str, Any]:
+def facts(validation: Validation) -> dict[str, Any]:
     """Return the answer as plain values."""
-    fit, bench = found.fit, found.fit.bench
-    gained, channel, middle_nm, change, left = fit.mended()
-    wrong = {"channel": bench.setup.camera.mosaic.channels[channel], "middle_nm": middle_nm, "change": change}
-    wrong["chi2_left"] = left
-    lit = found.rows[found.rows["light"] >= 0]
+    fit, mosaic, mended = validation.fit, validation.fit.bench.setup.camera.mosaic, None
+    if validation.mended is not None:
+        mended = validation.mended._asdict() | {"channel": mosaic.channels[validation.mended.channel]}
+        del mended["gained"]
+    left_out = validation.fit.bench.left_out["left_out"]
     return {
-        "cfa": bench.setup.camera.mosaic.name,
-        "within": float((lit["residual_dn"] / lit["signal_dn"]).abs().max()),
+        "cfa": mosaic.name,
+        "within": validation.within,
         "chi2": fit.chi2,
         "degrees_of_freedom": fit.freedom,
         "p": fit.p,
         "unknowns": {name: dict(zip(("value", "low", "high"), fit.values[name], strict=True)) for name in UNKNOWNS},
-        "mends_most": wrong if fit.p < ODD and gained > 0 else None,
-        "separation": None if found.separation is None else found.separation._asdict(),
-        "left_out": {cause: int((bench.left_out["left_out"] == cause).sum()) for cause in CAUSES},
+        "mends_most": mended,
+        "separation": None if validation.separation is None else validation.separation._asdict(),
+        "left_out": {cause: int((left_out == cause).sum()) for cause in CAUSES},
     }

@@ -73,10 +73,10 @@ def validate(
     -------
     Answer
         How well the readings are predicted. ``facts`` has ``p`` (0 to 1: of residuals as large as these where the model
-        is right), ``within`` (largest residual of a lamp and place, relative), ``unknowns`` (of each name of ``hold``
-        its ``value`` and the ends ``low`` and ``high`` of its 95 % interval, NaN where it is held: DN, DN/e, nm, a
-        share, e), ``mends_most`` (channel, wavelength and relative change of the curve that is likely to be wrong),
-        ``separation`` (DN), ``chi2``, ``degrees_of_freedom`` and ``left_out``.
+        is right), ``within`` (largest residual of a reading, relative to its signal), ``unknowns`` (of each name of
+        ``hold`` its ``value`` and the ends ``low`` and ``high`` of its 95 % interval, NaN where it is held: DN, DN/e,
+        nm, a share, e), ``mends_most`` (channel, wavelength and relative change of the one curve that mends most, and
+        the chi-square that is left), ``separation`` (DN), ``chi2``, ``degrees_of_freedom`` and ``left_out``.
 
     Raises
     ------
@@ -109,19 +109,19 @@ def validate(
         if len(bench.table) == len(fit.bench.table):
             break
         fit = bench.fitted()
-    found = Validation(fit)
+    validation = Validation(fit)
     to = Path("outputs") / f"validate-{loaded.name}" if output is None else Path(output)
     with atomic(to / ROWS) as hidden:
-        found.rows.to_parquet(hidden, index=False)
-    write_text(report(found, file).html(), to / PAGE)
-    said = [*lines(found), f"Files: {to}/: {PAGE}, {ROWS}."]
+        validation.rows.to_parquet(hidden, index=False)
+    write_text(report(validation, file).html(), to / PAGE)
+    said = [*lines(validation), f"Files: {to}/: {PAGE}, {ROWS}."]
     if corrected is not None:
-        camera = found.corrected.camera
+        camera = validation.corrected.camera
         write_text(csv_text(loaded.grid.nodes_nm, dict(zip(channels, camera.qe, strict=True))), Path(corrected))
         numbers = camera.pixel.model_dump(include={"gain_dn_per_e", "offset_dn", "crosstalk"})
         pixel = ", ".join(f"{key}: {value:.6g}" for key, value in numbers.items())
         said.append(f"{corrected}: curves behind the shifted IR cut; with `pixel: {{{pixel}}}` the fitted camera.")
-    return Answer(said, {"folder": str(to), **facts(found)})
+    return Answer(said, {"folder": str(to), **facts(validation)})
 
 
 def bench_template(

@@ -14,7 +14,7 @@ from ...base.types import Array, Float
 from ...camera.model import scene_model
 from ...camera.setup import Setup
 from ...spectra.lights import Pair
-from .bench import Fit
+from .bench import ODD, Fit, Mended
 
 _SIGMAS = 1.96
 _USUAL = ("yellow", "red")
@@ -55,6 +55,16 @@ class Validation:
         total = groups[["weight", "part"]].sum()
         brightest = lit.loc[groups["signal_dn"].idxmax()].set_index(["light", "place"])
         return brightest.assign(residual=total["part"] / total["weight"], sigma=1 / np.sqrt(total["weight"]))
+
+    @cached_property
+    def within(self) -> float:
+        """Largest residual of a reading, relative to its signal."""
+        return float((self.rows["residual_dn"] / self.rows["signal_dn"])[self.rows["light"] >= 0].abs().max())
+
+    @property
+    def mended(self) -> Mended | None:
+        """Change of one curve that mends most; None where readings fit, or where no change is more than chance."""
+        return self.fit.mended if self.fit.p < ODD and self.fit.mended.gained > 0 else None
 
     @cached_property
     def corrected(self) -> Setup:
