@@ -18,18 +18,24 @@ _MOST_TRIES = 4
 _SPACES = ("designs", "sweeps", "boxes")
 _CURVES = ("wavelengths", "sensor", "sensors", "colorants")
 _QUANTITIES = (
-    *(
-        "lights",
-        "recognition.states",
-        "production",
-        "population",
-        "uncertainty",
-        "pixel.captures",
-        "scenarios.*.target",
-    ),
-    *("scenarios.*.drive", "metrics", "tasks", "vision", "sweeps.*.family", "boxes.*.family"),
-    *("search.algorithm", "search.space", "search.front"),
+    "lights",
+    "recognition.states",
+    "production",
+    "population",
+    "uncertainty",
+    "pixel.captures",
+    "scenarios.*.target",
+    "scenarios.*.drive",
+    "metrics",
+    "tasks",
+    "vision",
+    "sweeps.*.family",
+    "boxes.*.family",
+    "search.algorithm",
+    "search.space",
+    "search.front",
 )
+"""Keys that say which quantities a study has."""
 _ONLY = {
     "production": ("worst_",),
     "population": ("worst_", "yield_"),
@@ -100,7 +106,7 @@ class Partial:
             *(written(self._data.get(str(fault.path[0])), key) for key in fault.path[1:2]),
             *fault.path[2:],
         )
-        names = [".".join(("*" if at == 1 else str(key)) for at, key in enumerate(path[:end])) for end in (3, 2, 1)]
+        names = [".".join("*" if at == 1 else str(key) for at, key in enumerate(path[:end])) for end in (3, 2, 1)]
         names.insert(1, ".".join(map(str, path[:2])))
         needed = next((_WAITS[name] for name in names if name in _WAITS), None)
         if needed is _QUANTITIES:
