@@ -195,6 +195,7 @@ def test_noise_over_two_frames_has_half_the_freedom(study: sweep.LoadedStudy, fo
     assert sum(fit.chi2 for fit in found) == pytest.approx(sum(fit.freedom for fit in found), rel=0.08)
 
 
+@pytest.mark.slow
 def test_few_pixels_shift_no_gain(study: sweep.LoadedStudy, folder: Path) -> None:
     """A noise of few values is as often too large as too small; the gain is no larger for it."""
     table, rng, gains = pd.read_csv(folder / "readings.csv"), np.random.default_rng(9), list[float]()
