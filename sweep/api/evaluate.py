@@ -4,68 +4,48 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..base.disk import is_folder
 from ..base.errors import DataError, ValidationIssue, nearest
-from ..base.types import Array, Float
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
-from ..spectra import LightUnit
+from ..metrics.separation import csd_name
 from ..spectra.formats import files_in, read_curves
-from ..spectra.lights import Lights
+from ..spectra.lights import class_pairs, in_order
 from ..spectra.spectrum import Curves, Quantity
-from ..spectra.units import FITTING, Use, stated_quantity, used_as
+from ..spectra.units import FITTING, Use, light_unit, stated_quantity, used_as
 from ..study import Study
 from ..study.shipped import shipped_folder
 from .channels import NEW, RATIO, Layout, layout_of, sensor_file
-from .filter_evaluation import (
-    PLAIN_TILE,
-    USER_CURVE,
-    FilterEvaluation,
-    FilterUnderTest,
-    diagonal_curve,
-    evaluate_filter,
-    with_base,
-)
-from .loading import CurveSource, lights, load_study, make_study, sensor_source
+from .filter_evaluation import FilterEvaluation, evaluate_filter, with_base
+from .loading import lights as lights_of
+from .loading import load_study, make_study, sensor_source
+from .own_designs import space_of_curves
 
 _ASKED = "stopband"
 """Study of the package whose constraints a filter from a file is held against."""
 _OF_A_RUN = ("manifest.json", "provenance.json")
 
 
-@dataclass(frozen=True)
-class EvaluateOptions:
-    """Options of `evaluate`, as it says them; values that are None follow from the file or the run."""
-
-    column: str | None = None
-    channel: str | None = None
-    cfa: str | None = None
-    base: str | None = None
-    sensor: str = "ar0820"
-    lights: str | None = None
-    quantity: str | Sequence[str] | None = None
-    relative_to: str | None = None
-    transmission: bool = False
-    data: Path | str | None = None
-    allow_code: bool = False
-
-    def stated(self, *uses: Use) -> Quantity | None:
-        """Return the unit that is stated for a use."""
-        words = [self.quantity] if isinstance(self.quantity, str) else list(self.quantity or ())
-        stated = [stated_quantity(word) for word in words]
-        return next((quantity for quantity in stated if any(quantity in FITTING[use] for use in uses)), None)
-
-    @property
-    def of_lights(self) -> LightUnit | None:
-        """Unit that is stated for lights."""
-        return "photons" if (stated := self.stated("light")) == "photons" else stated and "energy"
-
-
-def evaluate(source: Path | str, *, design: str | int | None = None, **options: Any) -> FilterEvaluation:
+def evaluate(
+    source: Path | str,
+    *,
+    design: str | int | None = None,
+    column: str | None = None,
+    channel: str | None = None,
+    cfa: str | None = None,
+    base: str | None = None,
+    sensor: str | None = None,
+    lights: str | None = None,
+    quantity: str | Sequence[str] | None = None,
+    relative_to: str | None = None,
+    transmission: bool = False,
+    data: Path | str | None = None,
+    allow_code: bool = False,
+) -> FilterEvaluation:
     """Evaluate one filter beside RGGB, the CFA that it changes, and its upper bound.
 
     Parameters
@@ -74,19 +54,33 @@ def evaluate(source: Path | str, *, design: str | int | None = None, **options: 
         A file with the filter's curve, or the folder of a finished run.
     design : str or int, optional
         A design of the run: a `filter_id`, a name (paper_N4, RGGB), or ``best`` (default).
-    **options
-        Left out, they follow from the file, or are those of the run. ``column`` of the file; ``cfa`` and ``channel``
-        that the filter is for, ``base``, the curve that it replaces; ``sensor`` (default ar0820) and ``lights`` (tl16),
-        built in or a file; ``quantity``, units that heads do not tell (``qe``, ``transmission``, ``density``, ...);
-        ``relative_to``, the curve that its transmissions are multiplied by; ``transmission=True``, the clear pixel's;
-        for a run ``data``, the folder of its files, and ``allow_code``. A filter of a file is held against the
-        constraints of the shipped study ``stopband``.
+    column : str, optional
+        Column of the file; left out, the only one, or that of the channel.
+    channel, cfa : str, optional
+        Channel of a CFA that the filter of a file is for; left out, one that the sensor allows (N of RYNCy).
+    base : str, optional
+        Curve that it replaces; left out, that of the pixel diagonal to it.
+    sensor : str, optional
+        A built-in sensor or a file of QE curves; left out, ar0820. A run has its own.
+    lights : str, optional
+        Built-in lights or a file of spectra; left out, tl16, or those of the run.
+    quantity : str or sequence of str, optional
+        Units that heads do not tell (``qe``, ``transmission``, ``density``, ``energy``, ``photons``, ...).
+    relative_to : str, optional
+        The values are transmissions, to be multiplied by this curve of the sensor.
+    transmission : bool
+        The values are transmissions, to be multiplied by the clear pixel, or else the brightest curve.
+    data : path-like, optional
+        Folder of the files of a run.
+    allow_code : bool
+        Permit the code that a run was made with to run.
 
     Returns
     -------
     FilterEvaluation
         ``table`` of the CFAs, ``upper_bound``, DN (or ``no_upper_bound``, why there is none), ``gap`` to it, relative
-        to it (0 to 1), ``violated`` constraints of ``of_study``; printed, it is the text of `sweep evaluate`.
+        to it (0 to 1), constraints that are ``violated``: those of the run, or for a file of the study ``stopband``;
+        printed, it is the text of `sweep evaluate`.
 
     Raises
     ------
@@ -100,13 +94,41 @@ def evaluate(source: Path | str, *, design: str | int | None = None, **options: 
     >>> evaluation.gap  # doctest: +SKIP
     0.876
     """
-    path = Path(source)
-    if is_folder(path) and not _holds_curves(path):
-        return evaluate_filter(filter_of_run(path, design, EvaluateOptions(**options)))
-    for key, value in (("design", design), ("data", options.get("data")), ("allow-code", options.get("allow_code"))):
+    path, of_a_run = Path(source), is_folder(Path(source)) and not _holds_curves(Path(source))
+    words = [quantity] if isinstance(quantity, str) else list(quantity or ())
+    stated = [stated_quantity(word) for word in words]
+    of_file: dict[str, Any] = {"column": column, "channel": channel, "cfa": cfa, "base": base, "sensor": sensor}
+    of_file |= {"relative-to": relative_to, "transmission": transmission}
+    of_run = {"design": design, "data": data, "allow-code": allow_code}
+    for key, value in (of_file if of_a_run else of_run).items():
         if value:
-            raise DataError(ValidationIssue(f"`{key}` requires a run folder", str(path), None, f"--{key}", str(value)))
-    return evaluate_filter(filter_of_file(path, EvaluateOptions(**options)))
+            problem = f"`{key}` requires {'a file of curves' if of_a_run else 'a run folder'}"
+            raise DataError(ValidationIssue(problem, str(path), None, f"--{key}", str(value)))
+    if of_a_run:
+        return _of_run(path, design, lights, stated, None if data is None else Path(data), allow_code=allow_code)
+    study = _study_of_file(sensor or "ar0820", lights or "tl16", stated)
+    layout = _default_layout(study.sensor)
+    mosaic = Mosaic.from_name(cfa or layout.changed)
+    channel = channel or _channel_without_curve(mosaic, study.sensor)
+    if channel not in mosaic.channels:
+        known, near = ", ".join(mosaic.channels), nearest(channel, mosaic.channels)
+        raise DataError(
+            ValidationIssue(f"no such channel of {mosaic.name}", None, None, "--channel", channel, known, near)
+        )
+    usual = layout.base if (mosaic.name, channel) == (layout.changed, NEW) else None
+    base = base or usual or _diagonal_curve(mosaic, channel, study.sensor)
+    study.sensor.curve(base)
+    curves = read_curves(path)
+    column = _find_column(path, curves, column, channel)
+    use, unit = _use_of(curves, column, stated, transmission=bool(relative_to) or transmission)
+    factor = relative_to or (study.sensor.clear if transmission else base if use == "filter" else None)
+    used = used_as(curves, [column], use, unit)
+    curve = used.on(study.grid, column) * (1.0 if factor is None else study.sensor.curve(factor))
+    times = "" if factor is None else f", times {factor}"
+    note = f"{path}: {used.notes[-1]}{times}; it is {channel} of {mosaic.name}, in place of {base}"
+    space = space_of_curves(mosaic.name, {channel: base}, curve[None, None], None)
+    alike = with_base(mosaic, {channel: base}).name
+    return evaluate_filter(study, mosaic, space, _curve_names(study.sensor, alike, mosaic), [note])
 
 
 def _holds_curves(folder: Path) -> bool:
@@ -117,120 +139,80 @@ def _holds_curves(folder: Path) -> bool:
         return False
 
 
-def filter_of_file(path: Path, options: EvaluateOptions) -> FilterUnderTest:
-    """Read a filter from a file, with the CFA and lights to evaluate it with."""
-    sensor = sensor_source(options.sensor, {})
-    keys: dict[str, Any] = {}
-    if os.path.lexists(options.sensor):
-        start_nm, stop_nm = sensor_file(Path(options.sensor)).range_nm
+def _study_of_file(sensor: str, lights: str, stated: Sequence[Quantity]) -> Study:
+    """Return a study of a sensor and lights, with the constraints that a filter from a file is held against."""
+    source, folder = sensor_source(sensor, {}), shipped_folder()
+    keys: dict[str, Any] = {"sensor": source, **_lit(lights, stated)}
+    if os.path.lexists(sensor):
+        start_nm, stop_nm = sensor_file(Path(sensor)).range_nm
         keys["wavelengths"] = {"start_nm": start_nm, "stop_nm": stop_nm}
-    qe = _curves_of(sensor, keys)
-    layout = _default_layout(qe)
-    name = options.cfa or layout.changed
-    mosaic = Mosaic.from_name(name)
-    channel = options.channel or _channel_without_curve(mosaic, qe)
-    if channel not in mosaic.channels:
-        known = list(mosaic.channels)
-        near = nearest(channel, known)
-        raise DataError(
-            ValidationIssue(f"no such channel of {name}", None, None, "--channel", channel, ", ".join(known), near)
-        )
-    default = layout.base if (name, channel) == (layout.changed, NEW) else None
-    base = options.base or default or diagonal_curve(mosaic, channel, qe.qe)
-    qe.curve(base)
-    curves = read_curves(path)
-    column = _find_column(path, curves, options.column, channel)
-    use, stated = _use_of(curves, column, options)
-    factor = options.relative_to or (qe.clear if options.transmission else base if use == "filter" else None)
-    used = used_as(curves, [column], use, stated)
-    unit = used.units[column]
-    assert unit.quantity is not None
-    entry: dict[str, Any] = {"file": str(path.absolute()), "columns": {USER_CURVE + channel: column}}
-    entry |= {"quantity": unit.quantity, "scale": unit.factor or 1.0}
-    entry |= {} if factor is None else {"relative_to": factor}
-    times = "" if factor is None else f", times {factor}"
-    note = f"{path}: {used.notes[-1]}{times}; it is {channel} of {name}, in place of {base}"
-    with_filter = CurveSource({**sensor.keys, "files": [*sensor.keys["files"], entry]}, sensor.curves)
-    spectra, types = _lights_and_types(options.lights or "tl16", options.of_lights)
-    curve_names = _curve_names(qe, with_base(mosaic, {channel: base}).name, mosaic)
-    asked = mosaic, {channel: base}, with_filter, spectra, types, curve_names, keys, (note,)
-    return FilterUnderTest(*asked, study=_shipped_study())
+    if folder is not None:
+        asked = load_study(folder / f"{_ASKED}.yaml").study
+        keys |= {"study": asked.name, "constraints": dict(asked.constraints)}
+    channel = next((name for entry in source.keys["files"] for name in entry["columns"]), "G")
+    return make_study(cfas={"any": {"tile": [[channel]]}}, **keys).study
 
 
-def _shipped_study() -> Study | None:
-    """Return the study of the package whose constraints a filter is held against; None without its files."""
-    folder = shipped_folder()
-    return None if folder is None else load_study(folder / f"{_ASKED}.yaml").study
-
-
-def _use_of(curves: Curves, column: str, options: EvaluateOptions) -> tuple[Use, Quantity | None]:
+def _use_of(
+    curves: Curves, column: str, stated: Sequence[Quantity], *, transmission: bool
+) -> tuple[Use, Quantity | None]:
     """Return whether a column is QE or transmissions, and its quantity where it is stated or known."""
-    stated = options.stated("sensor", "filter")
-    told = stated or curves.units[column].quantity
-    if told is not None and not (options.relative_to or options.transmission):
-        return ("sensor" if told in FITTING["sensor"] else "filter"), stated
+    unit = next((quantity for quantity in stated if quantity in (*FITTING["sensor"], *FITTING["filter"])), None)
+    told = unit or curves.units[column].quantity
+    if told is not None and not transmission:
+        return ("sensor" if told in FITTING["sensor"] else "filter"), unit
     if told is None and any(name.startswith(f"{column}{RATIO}") for name in curves.values):
         return "sensor", "qe"  # of `sweep export`, whose transmissions stand beside it
-    return "filter", stated
+    return "filter", unit
 
 
-def filter_of_run(folder: Path, design: str | int | None, options: EvaluateOptions) -> FilterUnderTest:
-    """Take a design of a finished run, in the scene of its row, with the run's lights or others."""
-    from ..results.designs import BEST, find_design_row, row_curves, study_of
+def _of_run(
+    folder: Path,
+    design: str | int | None,
+    lights: str | None,
+    stated: Sequence[Quantity],
+    data: Path | None,
+    *,
+    allow_code: bool,
+) -> FilterEvaluation:
+    """Evaluate a design of a finished run, in the scene of its row, with the run's lights or others."""
+    from ..results.designs import BEST, find_design_row, row_space, study_of
     from ..results.output import read_output
 
     output = read_output(folder)
-    data = None if options.data is None else Path(options.data)
-    study = study_of(output, data, allow_code=options.allow_code)
+    study = study_of(output, data, allow_code=allow_code)
     row = find_design_row(output, design or BEST)
-    space, curves = row_curves(study, row)
+    space, scenario = row_space(study, row), str(row["scenario"])
     if space.filter is None:
         raise DataError(ValidationIssue("a plain CFA has no filter to judge", str(folder), None, "--design", design))
-    nodes_nm = study.grid.nodes_nm
-    filters = {USER_CURVE + channel: curve for channel, curve in zip(space.filter.channels, curves[0], strict=True)}
-    curves_nm = {name: (nodes_nm, curve) for name, curve in {**study.sensor.qe, **filters}.items()}
-    clear = study.sensor.clear if study.sensor.has_clear else None
-    plain = sensor_source(None, curves_nm, name=study.sensor.name, clear=clear)
-    sensor = CurveSource({**plain.keys, "technology": study.sensor.technologies}, plain.curves)
+    axes = tuple((float(row[name]),) for name in space.parameters)
+    own = replace(space, kind="design", axes=axes, gridded=True, listed=0)
     mosaic = study.mosaics[space.cfa]
-    curve_names = _curve_names(study.sensor, space.cfa, mosaic) | dict(study.section.cfas[space.cfa].curves)
-    if options.lights is None:
-        spectra, types = _lights_of_run(study.lights, nodes_nm), study.lights.classes
-    else:
-        spectra, types = _lights_and_types(options.lights, options.of_lights)
-        if "files" in spectra.keys:  # as bright as the run's lights
-            spectra = CurveSource({**spectra.keys, "photon_ratio": study.lights.photon_ratio}, spectra.curves)
-    scene = {str(row["scenario"]): study.section.scenarios[str(row["scenario"])]}
-    keys = {"pixel": study.section.pixel, "scenarios": scene, "wavelengths": study.grid}
-    note = f"{folder}: {row['name'] or design} of {space.cfa}, in scenario {row['scenario']}"
-    bases = dict(space.filter.bases)
-    technology = space.filter.technology
-    return FilterUnderTest(mosaic, bases, sensor, spectra, types, curve_names, keys, (note,), technology, study)
+    names = _curve_names(study.sensor, space.cfa, mosaic) | dict(study.section.cfas[space.cfa].curves)
+    study = replace(study, scenarios={scenario: study.scenarios[scenario]}, warnings=())
+    if lights is not None:
+        study = _under(study, _lit(lights, stated))
+    name = row["name"] if isinstance(row["name"], str) else f"filter {row['filter_id']}"
+    note = f"{folder}: {name} of {space.cfa}, in scenario {scenario}"
+    return evaluate_filter(study, mosaic, own, names, [note])
 
 
-def _curves_of(source: CurveSource, keys: Mapping[str, Any]) -> SensorCurves:
-    """Return the curves of a sensor without a study."""
-    channel = next((name for entry in source.keys["files"] for name in entry["columns"]), "G")
-    return make_study(sensor=source, cfas={"any": {"tile": [[channel]]}}, **keys).study.sensor
+def _lit(lights: str, stated: Sequence[Quantity]) -> dict[str, Any]:
+    """Return keys of a study under lights, built in or in a file, whose objective is one that they have."""
+    source = lights_of(lights, quantity=light_unit(stated))
+    types = {kind for entry in source.keys.get("files", ()) for kind in entry["signals"]} or {"yellow", "red"}
+    return {"lights": source, "objective": csd_name(class_pairs(in_order(types))[0])}
 
 
-def _lights_and_types(source: str, quantity: LightUnit | None) -> tuple[CurveSource, tuple[str, ...]]:
-    """Return lights of a built-in data set or a file, and their signal types in order."""
-    spectra = lights(source, quantity=quantity)
-    if "files" in spectra.keys:
-        return spectra, tuple(dict.fromkeys(kind for entry in spectra.keys["files"] for kind in entry["signals"]))
-    return spectra, make_study(lights=spectra, cfas=[PLAIN_TILE]).study.lights.classes
-
-
-def _lights_of_run(spectra: Lights, nodes_nm: Float[Array, " nodes"]) -> CurveSource:
-    """Return the lights of a run, with the photons that they have in it."""
-    import pandas as pd
-
-    labels = [f"{kind} {name}" for kind, name in zip(spectra.types, spectra.names, strict=True)]
-    table = pd.DataFrame(spectra.photons.T, columns=labels, index=nodes_nm)
-    types = {kind: [labels[at] for at in indices] for kind, indices in spectra.members.items()}
-    source = lights(table, quantity="photons", types=types)
-    return CurveSource({**source.keys, "photon_ratio": spectra.photon_ratio}, source.curves)
+def _under(study: Study, keys: Mapping[str, Any]) -> Study:
+    """Return a study under other lights, those of a file as bright as its own, without what features know of these."""
+    other = make_study(**keys, cfas=["RGGB"], wavelengths=study.grid).study
+    if "files" in keys["lights"].keys:
+        other = replace(other, lights=replace(other.lights, photon_ratio=study.lights.photon_ratio))
+    under = replace(study, lights=other.lights, objective=other.objective, features={})
+    constraints = {name: bound for name, bound in study.constraints.items() if name in under.quantities}
+    notes = [f"{name} is not known under these lights" for name in study.constraints if name not in constraints]
+    return replace(under, constraints=constraints, warnings=(*other.warnings, *notes))
 
 
 def _curve_names(sensor: SensorCurves, cfa: str, mosaic: Mosaic) -> dict[str, str]:
@@ -254,6 +236,18 @@ def _channel_without_curve(mosaic: Mosaic, sensor: SensorCurves) -> str:
             ValidationIssue(f"which channel of {mosaic.name} is the filter?", None, None, "--channel", None, allowed)
         )
     return without[0]
+
+
+def _diagonal_curve(mosaic: Mosaic, channel: str, sensor: SensorCurves) -> str:
+    """Return the curve that a channel of a 2 x 2 tile replaces: that of the pixel diagonal to it."""
+    rows = mosaic.rows
+    at = [(r, c) for r, row in enumerate(rows) for c, name in enumerate(row) if name == channel]
+    if len(rows) == len(rows[0]) == 2 and len(at) == 1:
+        other = rows[1 - at[0][0]][1 - at[0][1]]
+        if other in sensor.qe:
+            return other
+    allowed = ", ".join(sensor.qe)
+    raise DataError(ValidationIssue(f"which curve does {channel} replace?", None, None, "--base", allowed=allowed))
 
 
 def _find_column(path: Path, curves: Curves, column: str | None, channel: str) -> str:

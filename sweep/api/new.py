@@ -14,10 +14,9 @@ from ..base.answer import Answer
 from ..base.disk import read_input
 from ..base.errors import DataError, OutputError, StudyError, SweepError, ValidationIssue
 from ..results.atomic import atomic, write_text
-from ..spectra import LightUnit
 from ..spectra.light_files import lights_file
 from ..spectra.read_text import MOST_BYTES
-from ..spectra.units import FITTING, stated_quantity
+from ..spectra.units import FITTING, light_unit, stated_quantity
 from ..study import Study, folder_name, load_study
 from ..study.editors import SCHEMA_FILE, TITLE, schema_text
 from ..study.schema import StudySection
@@ -71,8 +70,7 @@ def new_study(
         sources = replace(sources, sensor=sensor_file(of_sensor, stated))
     if of_lights:
         start_nm, stop_nm = (400, 700) if sources.sensor is None else sources.sensor.range_nm
-        unit: LightUnit | None = "photons" if "photons" in quantities else "energy" if "energy" in quantities else None
-        sources = replace(sources, lights=lights_file(of_lights, unit, start_nm, stop_nm))
+        sources = replace(sources, lights=lights_file(of_lights, light_unit(quantities), start_nm, stop_nm))
     new_folders = [place for place in (folder, *folder.parents) if not os.path.lexists(place)]
     try:
         study = _write(path, name, sources)

@@ -66,6 +66,11 @@ class Mosaic:
         return cls.from_rows(name, [tokens[:2], tokens[2:]])
 
     @property
+    def rows(self) -> list[list[str]]:
+        """Tile of channel names."""
+        return [[self.channels[index] for index in row] for row in self.tile]
+
+    @property
     def indices(self) -> Int[IndexArray, "rows columns"]:
         """Tile of channel indices."""
         return np.asarray(self.tile, dtype=np.intp)

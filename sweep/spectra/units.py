@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base.errors import DataError, ValidationIssue, nearest
 from ..base.types import PerSample, PerWavelength
+from . import LightUnit
 from .clean import several
 from .spectrum import LIGHT_M_S, PLANCK_J_S, Curves, Quantity, Unit
 
@@ -115,13 +116,19 @@ _TRAILING = re.compile(
 )
 
 
-def stated_quantity(word: str | None) -> Quantity | None:
+def stated_quantity(word: str) -> Quantity:
     """Return a unit that a user states; raises DataError for an unknown one."""
     known = {str(quantity): quantity for of_use in FITTING.values() for quantity in of_use}
-    if word is not None and word not in known:
+    if word not in known:
         near = nearest(word, known)
         raise DataError(ValidationIssue("unknown quantity", None, None, "--quantity", word, ", ".join(known), near))
-    return None if word is None else known[word]
+    return known[word]
+
+
+def light_unit(stated: Iterable[Quantity]) -> LightUnit | None:
+    """Return the unit of lights among stated quantities."""
+    known = {*stated}
+    return "photons" if "photons" in known else "energy" if "energy" in known else None
 
 
 def folded(text: str) -> str:

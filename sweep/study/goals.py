@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..base.errors import Fault, InfeasibleError, ValidationIssue, unknown
 from ..base.user_code import kind_in_words
-from ..camera.scene import WhitePatchExposure
+from ..camera.scene import Scene, WhitePatchExposure
 from ..designs.family import ChoosingFamily
 from ..designs.space import Space
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
@@ -52,16 +52,15 @@ def with_pairs_in_order(section: StudySection, requested: RequestedQuantities) -
     return section.model_copy(update={"objective": objective, "constraints": constraints})
 
 
-def brightness_note(section: StudySection, requested: RequestedQuantities) -> str | None:
-    """Return a note where the objective counts how bright a lamp is, and lamps differ in photons."""
+def brightness_note(goals: Iterable[str], scenes: Iterable[Scene], requested: RequestedQuantities) -> Iterator[str]:
+    """Yield a note where a goal counts how bright a lamp is, and lamps of a scene differ in photons."""
     known = quantities_of(requested)
-    counted = [name for name in section.objective.weights if name in known and _counts_brightness(known[name])]
-    if not counted or all(scene.equal_photons for scene in section.scenarios.values()):
-        return None
-    return (
-        f"{counted[0]} counts how bright a lamp is, where signals differ in photons (`intensity_cd`, `drive`): "
-        f"chromatic_{counted[0].removeprefix('worst_')} does not"
-    )
+    counted = [name for name in goals if name in known and _counts_brightness(known[name])]
+    if counted and not all(scene.equal_photons for scene in scenes):
+        yield (
+            f"{counted[0]} counts how bright a lamp is, where signals differ in photons (`intensity_cd`, `drive`): "
+            f"chromatic_{counted[0].removeprefix('worst_')} does not"
+        )
 
 
 def check_goals(section: StudySection, requested: RequestedQuantities, *, written_out: bool) -> Iterator[Fault]:

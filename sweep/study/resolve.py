@@ -114,8 +114,7 @@ def _goal_faults(
     """Return what is wrong with objective and constraints; those of metrics with doubtful names are not looked at."""
     if named := [*check_names(metrics, requested, spaces)]:
         return named
-    if (note := brightness_note(section, requested)) is not None:
-        sources.warnings.append(note)
+    sources.warnings += brightness_note(section.objective.weights, section.scenarios.values(), requested)
     written_out = isinstance(sources.document.data.get("objective"), dict)
     faults = [*check_goals(section, requested, written_out=written_out)]
     if search is not None:

@@ -99,3 +99,28 @@ def test_evaluate_loads_no_unneeded_modules(own: Path) -> None:
     loaded = set(done.stderr.split())
     assert {"numpy", "scipy.optimize"} <= loaded
     assert not loaded & {"numba", "scipy.stats", "pandas", "matplotlib", "colour", "sklearn", "joblib", "jinja2"}
+
+
+@pytest.mark.usefixtures("plain_pictures")
+def test_a_design_of_a_run_is_held_against_all_that_the_run_constrains(tmp_path: Path) -> None:
+    """Also what its curve alone does not tell; lamps without a constrained type leave that out, and say so."""
+    keys = {
+        "constraints": {"edge_width_nm": {"min": 5}, "csd_orange_red": {"min": 1}},
+        "production": {"edge_shift_nm": 1},
+    }
+    study = sweep.make_study(
+        "small",
+        cfas=["RYNCy"],
+        designs={
+            "one": {"cfa": "RYNCy", "family": "stopband", "channel": "N", "base": "Y", "to": "G", "at": "paper_N4"}
+        },
+        **keys,
+    )
+    run = study.run(tmp_path, jobs=1)
+    found = sweep.evaluate(run.folder, design="one")
+    assert found.violated == []
+    row = found.table.iloc[-1]
+    assert {row[c] == pytest.approx(run.table.iloc[-1][c]) for c in ("edge_width_nm", "worst_csd_yellow_red")} == {True}
+    leds = csv(tmp_path, "wavelength_nm,b,c", WAVE, *(bell(c, 12) for c in (592, 636)), name="leds.csv")
+    code, out, _ = commanded("evaluate", run.folder, "--design", "one", "--lights", leds)
+    assert (code, "csd_orange_red is not known under these lights." in out) == (0, True)

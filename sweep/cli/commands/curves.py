@@ -32,7 +32,9 @@ def evaluate_(
     column: Annotated[
         str | None, typer.Option(help="Column of the file.", show_default="the only one, or CHANNEL")
     ] = None,
-    sensor: Annotated[str, typer.Option(help="A built-in sensor, or a file of QE curves.")] = "ar0820",
+    sensor: Annotated[
+        str | None, typer.Option(help="A built-in sensor, or a file of QE curves.", show_default="ar0820")
+    ] = None,
     lights: Annotated[
         str | None, typer.Option(help="tl16, or a file of spectra.", show_default="tl16, or the run's")
     ] = None,

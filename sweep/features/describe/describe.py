@@ -53,7 +53,7 @@ def describe(file: Path | str, *, output: Path | str = "outputs/describe", quant
     SweepError
         If nothing can be read, or the picture cannot be written.
     """
-    path, folder, stated = Path(file), Path(output), stated_quantity(quantity)
+    path, folder, stated = Path(file), Path(output), stated_quantity(quantity) if quantity else None
     lines, issues, facts = _described(path, folder, stated)
     values = {"file": str(file), **facts, "faults": [str(issue) for issue in issues]}
     return Answer(lines, values, DataError(issues) if issues else None)

@@ -95,7 +95,7 @@ def _of_pattern(name: Any, *, modified: bool) -> Iterator[tuple[str, Any, str]]:
         mosaic = Mosaic.from_name(str(name))
     except SweepError as error:
         raise Fault(("cfas", TILES), error.issues[0].problem, name, error.issues[0].allowed) from None
-    rows = [[mosaic.channels[index] for index in row] for row in mosaic.tile]
+    rows = mosaic.rows
     if not modified:
         yield str(name), rows, ""
     for channel in mosaic.channels if modified else ():
