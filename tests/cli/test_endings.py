@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -24,7 +25,7 @@ COMMAND = [sys.executable, "-m", "sweep"]
         (["run", "x.yaml", "--jobs", "0"], "--jobs"),
         (["run", "x.yaml", "--job", "2"], "No such option"),
         (["chek", "x.yaml"], "No such command 'chek'"),
-        (["check", "a.yaml", "b"], "unexpected extra argument"),
+        (["plan", "a.yaml", "b"], "unexpected extra argument"),
         (["check", "nowhere.yaml"], "nowhere.yaml: cannot be read"),
         (["check", "stopband", "--data", "nowhere"], "nowhere"),
         (["check", "stopband", "--set", "seed"], "not KEY=VALUE"),
@@ -41,6 +42,16 @@ def test_a_wrong_command_is_one_line(arguments: list[str], expected: str) -> Non
     assert said.startswith("sweep: "), said
     assert said.count("\n") == 1, said
     assert expected in said
+
+
+def test_several_studies_are_checked_at_once_and_a_fault_hides_none(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("study: bad\nsensor: ar0821\nlights: tl16\ncfas: [RGGB]\n")
+    code, out, said = commanded("check", bad, "paper", "stopband")
+    assert (code, out.count("nothing wrong found"), said.count("\n")) == (2, 2, 1)
+    assert f"{bad}:2: sensor: unknown built-in sensor" in said
+    first, *others = json.loads(commanded("check", bad, "paper", "--json")[1])["files"]
+    assert [first["file"], len(first["faults"]), len(others)] == [str(bad), 1, 1]
 
 
 EARLY = """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -29,17 +30,31 @@ PANEL = OF_STUDIES
 
 
 def check(
-    study: StudyPath,
+    studies: StudyPaths,
     data: DataFolder = None,
     changes: Changes = None,
     allow_code: AllowCode = False,
     as_json: Json = False,
     quiet: Quiet = False,
-) -> None:
-    """Check a study file and count its designs, without running it."""
+) -> int:
+    """Check study files and count their designs, without running them; what is wrong with one hides no other one."""
     from ...api.check import check as checked
 
-    print_answer(checked(study, data, changes=changes_of(changes), allow_code=allow_code), as_json=as_json, quiet=quiet)
+    changed, code = changes_of(changes), 0
+    found: list[Mapping[str, Any]] = []
+    for study in studies:
+        try:
+            answer = checked(study, data, changes=changed, allow_code=allow_code)
+        except SweepError as error:
+            print_issues(error.issues)
+            code = max(code, error.exit_code)
+            found.append({"file": str(study), "faults": [str(issue) for issue in error.issues]})
+            continue
+        print_lines(answer.lines, as_json=as_json, quiet=quiet)
+        found.append(answer.facts)
+    if as_json:
+        print_json(found[0] if len(found) == 1 else {"files": found})
+    return code
 
 
 def list_(
