@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from copy import deepcopy
 from itertools import product
 from typing import Annotated, Any
 
@@ -14,6 +13,7 @@ from ..base.errors import Fault
 from ..base.types import Number, Section
 from ..camera.pixel import Pixel
 from ..camera.scene import Scene
+from .document import put
 from .schema_curves import Name
 
 FORMS = "a number, a list of numbers, `min`, `max` and `count`, or `geometric: [min, max, count]`"
@@ -130,11 +130,15 @@ def _expanded(value: dict[str, Any]) -> dict[str, Any]:
         if count * _size(entry) > _MOST_KEYS:
             raise Fault((name, "each"), "too many keys in all scenarios that it makes", None, f"at most {_MOST_KEYS:,}")
         for point in product(*axes):
-            scenario = deepcopy({key: inner for key, inner in entry.items() if key != "each"})
+            scenario: Any = {key: inner for key, inner in entry.items() if key != "each"}
             full = str(name)
             at = {key: number for values in point for key, number in values.items()}
             for key, number in at.items():
-                _set(scenario, str(name), key, number)
+                try:
+                    scenario = put(scenario, key.split("."), number)
+                except Fault as fault:
+                    problem = f"{fault.path[-1]} {fault.problem} in this scenario"
+                    raise Fault((name, "each", key), problem, fault.value, "a key of a mapping") from None
                 full += f" {key.rsplit('.', 1)[-1]}={number:.12g}"
             scenario |= {"series": str(name), "at": at}
             if full in scenarios:
@@ -183,18 +187,6 @@ def _numbers(path: tuple[str, ...], axis: Any) -> tuple[float, ...]:
     points = checked.points()
     whole = isinstance(axis, dict) and all(isinstance(axis.get(end), int) for end in ("min", "max"))
     return tuple(int(value) if whole and value == int(value) else value for value in points)
-
-
-def _set(mapping: dict[str, Any], name: str, dotted: str, number: float) -> None:
-    """Put a number at a dotted path of a scenario."""
-    path = dotted.split(".")
-    for key in path[:-1]:
-        if mapping.get(key) is True:  # switched on, with its defaults
-            mapping[key] = {}
-        mapping = mapping.setdefault(key, {})
-        if not isinstance(mapping, dict):
-            raise Fault((name, "each", dotted), f"{key} is no mapping in this scenario", None, "a key of a mapping")
-    mapping[path[-1]] = number
 
 
 def series_of(scenes: Mapping[str, Scene]) -> dict[tuple[str, str], dict[str, float]]:

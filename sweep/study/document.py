@@ -76,6 +76,51 @@ Place = int | str
 """A line from 1, or the option that a value came from."""
 
 
+class Keys(dict[Key, Any]):
+    """A mapping of a document; `places`: where each of its keys stands."""
+
+    def __init__(self, value: Mapping[Key, Any] = {}, places: Mapping[Key, Place] = {}) -> None:
+        super().__init__(value)
+        self.places = dict(places)
+
+
+class Entries(list[Any]):
+    """A list of a document; `places`: where each of its entries stands."""
+
+    def __init__(self, value: Iterable[Any] = (), places: Mapping[Key, Place] = {}) -> None:
+        super().__init__(value)
+        self.places = dict(places)
+
+
+def put(node: Any, path: Sequence[Key], value: Any, place: Place | None = None) -> Any:
+    """Return a mapping or a list with a value at a path, which is made where it is missing.
+
+    What the path leads through is copied, the rest is shared. A key that is `true` has its defaults. Raises Fault at
+    what is no mapping, or has no such entry.
+    """
+    if not path:
+        return value
+    (key, *rest), places = path, getattr(node, "places", {})
+    changed: Any = None
+    if isinstance(node, list):
+        if not (str(key).isdecimal() and int(key) < len(node)):
+            raise Fault((), "has no such entry", key, f"0 to {len(node) - 1}")
+        key, changed = int(key), Entries(node, places)
+    elif isinstance(node, dict) or node is True:
+        changed = Keys({} if node is True else node, places)
+    else:
+        raise Fault((), "is no mapping", None, "the whole of it")
+    is_new = not _has(changed, key)
+    try:
+        inner = put(Keys() if is_new else changed[key], rest, value, place)
+    except Fault as fault:
+        raise fault.under(key) from None
+    changed[key] = inner
+    if place is not None and (is_new or not rest):
+        changed.places[key] = place
+    return changed
+
+
 @lru_cache(maxsize=4)
 def _composed(text: str) -> Node | None:
     """Return the nodes of a document, once for all members of a study of several."""
@@ -88,13 +133,13 @@ def _composed(text: str) -> Node | None:
 class Tree:
     """The value of a YAML document (YAML 1.2, core schema; `<<` merges mappings), and the line of each of its keys.
 
-    At most `most_values` keys and values, those of an alias counted each time that it stands for them. Raises
-    StudyError with file and line: not YAML, beyond the limits, a key twice, a tag, a second document.
+    At most `most_values` keys and values, those of an alias counted each time that it stands for them; `option`: it
+    stands there instead of in a file. Raises StudyError with file and line: not YAML, beyond the limits, a key twice, a
+    tag, a second document.
     """
 
-    def __init__(self, text: str, file: str | None, most_values: int) -> None:
-        self._file, self._most, self._count = file, most_values, 0
-        self._lines: dict[int, tuple[Any, dict[Key, Place]]] = {}  # with its value, so that no other one has the id
+    def __init__(self, text: str, file: str | None, most_values: int, option: str | None = None) -> None:
+        self._file, self._most, self._option, self._count = file, most_values, option, 0
         if version := re.match(r"%YAML\s+(?!1\.2\s)\S*", text):
             raise self._error("another version of YAML", 1, (), version.group(), "%YAML 1.2, or no such line")
         self._resolve = YAML(typ="safe", pure=True).resolver.resolve
@@ -114,18 +159,6 @@ class Tree:
             raise self._error(f"not valid YAML: {type(error).__name__} {error}", None) from None
         self.root: Any = None if root is None else self._value(root, ())
 
-    def place(self, node: Any, key: Key) -> Place | None:
-        """Return the position of a mapping's key or of a list's entry in the file.
-
-        None if the file does not contain it.
-        """
-        return self._lines[id(node)][1].get(key) if id(node) in self._lines else None
-
-    def put(self, node: Any, key: Key, value: Any, place: Place) -> None:
-        """Set a mapping's key or a list's entry to a value from another position."""
-        node[key] = value
-        self._lines.setdefault(id(node), (node, {}))[1][key] = place
-
     def _value(self, node: Node, path: tuple[str, ...], depth: int = 0) -> Any:
         """Return the plain value of a node; `path`: the keys that lead to it."""
         line = self._counted(node, path)
@@ -139,10 +172,10 @@ class Tree:
         if not isinstance(node, SequenceNode):
             return self._mapping(node, path, depth)
         entries = [self._value(entry, path, depth + 1) for entry in node.value]
-        self._lines[id(entries)] = entries, {i: entry.start_mark.line + 1 for i, entry in enumerate(node.value)}
-        return entries
+        lines = [entry.start_mark.line + 1 for entry in node.value]
+        return Entries(entries, {i: self._option or line for i, line in enumerate(lines)})
 
-    def _mapping(self, node: Node, path: tuple[str, ...], depth: int) -> dict[Key, Any]:
+    def _mapping(self, node: Node, path: tuple[str, ...], depth: int) -> Keys:
         value: dict[Key, Any] = {}
         lines: dict[Key, Place] = {}
         merged: list[dict[Key, Any]] = []
@@ -153,7 +186,7 @@ class Tree:
                 raise self._error("a key that is no word", line, path, allowed="`key: value`")
             if key in lines:
                 raise self._error(f"found duplicate key {key!r}", line, path)
-            lines[key] = line
+            lines[key] = self._option or line
             converted = self._value(inner, (*path, key), depth + 1)
             if key == "<<" and key_node.style is None:
                 sources = converted if isinstance(converted, list) else [converted]
@@ -164,8 +197,7 @@ class Tree:
                 value[key] = converted
         for source in merged:
             value |= {key: converted for key, converted in source.items() if key not in value}
-        self._lines[id(value)] = value, lines
-        return value
+        return Keys(value, lines)
 
     def _counted(self, node: Node, path: tuple[str, ...]) -> int:
         """Count a key or a value, check its characters, and return its line."""
@@ -232,8 +264,7 @@ class Document:
         resolved = isinstance(source, Path) and source.name.endswith(".resolved.yaml")
         most_bytes, most_values = _MOST_RESOLVED if resolved else _MOST
         text = _text(source, most_bytes) if isinstance(source, Path) else yaml_text(source)
-        self._tree = Tree(text, self.file, most_values)
-        self.data: dict[str, Any] = self._tree.root
+        self.data: dict[str, Any] = Tree(text, self.file, most_values).root
         if not isinstance(self.data, dict):
             allowed = "`study: name` and further keys"
             raise StudyError(ValidationIssue("a study file is a mapping of keys", self.file, 1, allowed=allowed))
@@ -245,34 +276,18 @@ class Document:
         """
         option = f"--set {key}={text}"
         try:
-            value = Tree(f"value: {text}", None, _MOST[1]).root["value"]
+            value = Tree(f"value: {text}", None, _MOST[1], option).root["value"]
         except StudyError as error:
             raise StudyError([replace(issue, file=option, line=None, key=None) for issue in error.issues]) from None
-        *path, last = key.split(".")
-        node: Any = self.data
-        for at, part in enumerate(path):
-            if isinstance(node, dict) and part not in node:
-                self._tree.put(node, part, {}, option)
-            node = _child(node, int(part) if isinstance(node, list) and part.isdecimal() else part)
-            if not isinstance(node, dict | list):
-                where = ".".join(path[: at + 1])
-                raise StudyError(
-                    ValidationIssue(f"`{where}` is no mapping in {self.file}", option, allowed="the whole of it")
-                )
-        if isinstance(node, list) and not (last.isdecimal() and int(last) < len(node)):
-            raise StudyError(
-                ValidationIssue("no such entry of the list", option, value=last, allowed=f"0 to {len(node) - 1}")
-            )
-        self._tree.put(node, int(last) if isinstance(node, list) else last, value, option)
-
-    def take(self, key: str, at: int, to: str) -> None:
-        """Set a key to an entry of another one's list, with its position."""
-        entries = self.data[key]
-        self._tree.put(self.data, to, entries[at], self._tree.place(entries, at) or self.place((key,)))
+        try:
+            self.data = put(self.data, key.split("."), value, option)
+        except Fault as fault:
+            problem = f"`{dotted(fault.path)}` {fault.problem} in {self.file}"
+            raise StudyError(ValidationIssue(problem, option, None, None, fault.value, fault.allowed)) from None
 
     def put(self, key: str, value: Any, of: Sequence[Key]) -> None:
         """Set a key, with the position of another one."""
-        self._tree.put(self.data, key, value, self.place(of))
+        self.data = put(self.data, (key,), value, self.place(of))
 
     def expand(self, key: str, names: Iterable[str]) -> None:
         """Replace each entry of a list with `*` by the names that it stands for.
@@ -282,17 +297,14 @@ class Document:
         entries, known = self.data.get(key), list(names)
         if not isinstance(entries, list):
             return
-        expanded = list[tuple[Any, Place]]()
+        expanded = Entries()
         for at, entry in enumerate(entries):
-            place = self._tree.place(entries, at) or self.place((key,))
             found = fnmatch.filter(known, entry) if isinstance(entry, str) and "*" in entry else [entry]
             if not found:
                 raise StudyError(self.issue((key, at), "no built-in name fits", entry, ", ".join(known[:_MOST_NAMED])))
-            expanded += [(name, place) for name in found]
-        self._tree.put(self.data, key, [], self.place((key,)))
-        for name, place in expanded:
-            self.data[key].append(name)
-            self._tree.put(self.data[key], len(self.data[key]) - 1, name, place)
+            expanded.places |= dict.fromkeys(range(len(expanded), len(expanded) + len(found)), self.place((key, at)))
+            expanded += found
+        self.put(key, expanded, (key,))
 
     def place(self, path: Sequence[Key]) -> Place:
         """Return the position of the deepest existing key of a path.
@@ -307,11 +319,11 @@ class Document:
                 key = node.index(part)  # a list of names, which is read as a mapping
             if not _has(node, key):
                 axes, dotted_key = _child(node, "each"), ".".join(map(str, path[at:]))
-                return (self._tree.place(axes, dotted_key) or place) if _has(axes, dotted_key) else place
-            place = self._tree.place(node, key) or place
+                return (_place(axes, dotted_key) or place) if _has(axes, dotted_key) else place
+            place = _place(node, key) or place
             node = node[key]
         keys = node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ()
-        return next((inner for key in keys if isinstance(inner := self._tree.place(node, key), str)), place)
+        return next((inner for key in keys if isinstance(inner := _place(node, key), str)), place)
 
     def issue(
         self,
@@ -436,6 +448,12 @@ def _known_keys(schema: dict[str, Any], path: Sequence[Key], data: Any) -> list[
         if kind is None or not isinstance(node, dict) or node.get("kind", keys["kind"].get("default")) == kind:
             return list(keys)
     return []
+
+
+def _place(node: Any, key: Key) -> Place | None:
+    """Return where a mapping's key or a list's entry stands; None if the file does not contain it."""
+    places: Mapping[Key, Place] = getattr(node, "places", {})
+    return places.get(key)
 
 
 def _has(node: Any, key: Key) -> bool:

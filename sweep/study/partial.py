@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
+from copy import copy, deepcopy
 from typing import Any
 
 from pydantic import ValidationError
@@ -78,7 +78,7 @@ class Partial:
     def __init__(self, document: Document, error: ValidationError) -> None:
         self.issues = document.issues(error, StudySection)
         faults = document.faults(error, StudySection)
-        self._data = document.data
+        self._document, self._data = document, document.data
         self._faulty = [path for path, _ in faults]
         self._faulty += [(*path[:-1], issue.nearest) for path, issue in faults if issue.nearest and path]
         self.section = self._without_faulty()
@@ -90,11 +90,12 @@ class Partial:
                 return None
             for path in paths:
                 _drop(data, path)
-            whole = _INSTEAD | data
+            document = copy(self._document)
+            document.data = _INSTEAD | data
             try:
-                return StudySection.model_validate(whole)
+                return StudySection.model_validate(document.data)
             except ValidationError as error:
-                found = [path for path, _ in Document(whole).faults(error, StudySection)]
+                found = [path for path, _ in document.faults(error, StudySection)]
                 paths = [path[:-1] if path in paths or len(path) > 1 else path for path in found]
                 self._faulty += paths
         return None

@@ -30,7 +30,7 @@ COMMAND = [sys.executable, "-m", "sweep"]
         (["check", "stopband", "--data", "nowhere"], "nowhere"),
         (["check", "stopband", "--set", "seed"], "not KEY=VALUE"),
         (["check", "stopband", "--set", "study.name=x"], "--set study.name=x: `study` is no mapping"),
-        (["check", "stopband", "--set", "cfas.7=RGGB"], "no such entry of the list"),
+        (["check", "stopband", "--set", "cfas.7=RGGB"], "`cfas` has no such entry"),
         (["plan", "stopband", "--tolerance", "inf"], "tolerance"),
         (["report", "nowhere"], "nowhere"),
         (["audit", "nowhere"], "nowhere"),

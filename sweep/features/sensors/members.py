@@ -90,7 +90,7 @@ def choose(document: Document, member: SensorAndLights) -> None:
     """
     for key, to, at in (("sensors", "sensor", member.indices[0]), ("lights", "lights", member.indices[1])):
         if at >= 0:
-            document.take(key, at, to)
+            document.put(to, document.data[key][at], (key, at))
     document.data.pop("sensors", None)
     if member.pixel:
         pixels = document.data["pixels"]
