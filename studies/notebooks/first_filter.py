@@ -54,4 +54,4 @@ print(f"{limit.proven:.1f} DN is the limit; ours reaches {table.csd_yellow_red[0
 # Where does the filter stand among the curves and the lights?
 
 # %%
-figure = study.plot(N=mine)
+figure = study.curves.assign(N=mine).plot()

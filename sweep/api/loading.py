@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard
 
@@ -12,8 +12,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from .. import study as studies_of_files
-from ..base.errors import DataError, StudyError, ValidationIssue, nearest
-from ..camera.mosaic import Mosaic
+from ..base.errors import DataError, StudyError, ValidationIssue
 from ..spectra import LightUnit
 from ..spectra.light_files import lights_file
 from ..spectra.spectrum import Curves
@@ -24,10 +23,6 @@ from .objects import FinishedRun, LoadedStudy
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-_OF_A_FILTER = ("cfa", "channel", "base", "to", "family", "options", "technology")
-"""Keys of a filter that `make_study` takes beside those of a study."""
 
 
 @dataclass(frozen=True)
@@ -134,9 +129,8 @@ def make_study(
     allow_code : bool
         Permit the code that the study names to run.
     **keys
-        Further keys of a study file. Sections such as ``pixel`` are mappings or objects such as `Pixel`. `channel`,
-        `base`, `to`, `family` and `options` make a filter of which `evaluate` takes parameters: that channel of `cfa`,
-        or of the only CFA that has it.
+        Further keys of a study file. Sections such as ``pixel`` are mappings or objects such as `Pixel`. A filter in
+        ``boxes`` is one of which `evaluate` takes parameters.
 
     Returns
     -------
@@ -154,11 +148,12 @@ def make_study(
     >>> mine = sweep.make_study(cfas=["RGGB", "RYYCy"], pixel=sweep.Pixel(bits=10))
     >>> mine.evaluate().csd_yellow_red.round().tolist()
     [35.0, 8.0]
-    >>> stopband = sweep.make_study(cfas=["RGGB", "RYNCy"], channel="N", base="Y", to="G")
+    >>> edges = {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": "G"}
+    >>> stopband = sweep.make_study(cfas=["RGGB", "RYNCy"], boxes={"edges": edges})
     >>> stopband.evaluate(left_nm=613, right_nm=651, left_width_nm=6, right_width_nm=6).csd_yellow_red.round().tolist()
     [234.0]
     """
-    document = {"study": study, "sensor": sensor, "lights": lights, **_with_filter(keys)}
+    document = {"study": study, "sensor": sensor, "lights": lights, **keys}
     curves: dict[str, Curves] = {}
     for source in (sensor, lights):
         curves |= source.curves if isinstance(source, CurveSource) else {}
@@ -167,52 +162,6 @@ def make_study(
         return LoadedStudy(studies_of_files.study_of_keys(plain, Path.cwd(), curves, allow_code=allow_code))
     except RecursionError:
         raise StudyError("a value of the study holds itself, or is nested too deep") from None
-    except StudyError as error:
-        raise StudyError([_as_given(issue, keys) for issue in error.issues]) from None
-
-
-def _with_filter(keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Return keys of a study in which those of one filter are a box of it."""
-    stated = {key: keys[key] for key in _OF_A_FILTER if key in keys}
-    rest = {key: value for key, value in keys.items() if key not in stated}
-    if not stated:
-        return rest
-    cfas = [str(name) for name in keys.get("cfas", ())]
-    channel = stated.get("channel")
-    if "cfa" not in stated:
-        wanted = {channel} if isinstance(channel, str) else set(channel or ())
-        channels = {cfa: _channels(cfa, keys["cfas"]) for cfa in cfas}
-        having = [cfa for cfa in cfas if wanted and wanted <= set(channels[cfa])]
-        known = list(dict.fromkeys(name for names in channels.values() for name in names))
-        if not having:
-            problem, near = ("unknown channel", nearest(channel, known)) if wanted else ("missing", None)
-            issue = ValidationIssue(problem, key="channel", value=channel, allowed=", ".join(known), nearest=near)
-            raise StudyError(issue)
-        if len(having) > 1:
-            problem = f"several CFAs have the channel {channel}"
-            raise StudyError(ValidationIssue(problem, key="cfa", allowed=", ".join(having)))
-        stated["cfa"] = having[0]
-    boxes = {**rest.pop("boxes", {}), str(stated.get("family", "stopband")): stated}
-    return {**rest, "boxes": boxes}
-
-
-def _channels(name: str, cfas: Any) -> tuple[str, ...]:
-    """Return the channels of a CFA; raises SweepError for a name that is none."""
-    tile = cfas[name] if isinstance(cfas, Mapping) else None
-    if not isinstance(tile, Mapping):
-        return Mosaic.from_name(name).channels
-    return Mosaic.from_rows(name, tile.get("tile", ())).channels
-
-
-def _as_given(issue: ValidationIssue, keys: Mapping[str, Any]) -> ValidationIssue:
-    """Return an issue in terms of the arguments of `make_study`, some of which are of one filter."""
-    start = f"boxes.{keys.get('family', 'stopband')}."
-    if keys.keys() & set(_OF_A_FILTER) and issue.key is not None and issue.key.startswith(start):
-        return replace(issue, key=issue.key.removeprefix(start))
-    if issue.problem == "unknown key" and issue.key is not None and issue.allowed and "." not in issue.key:
-        known = [*issue.allowed.split(", "), *_OF_A_FILTER]
-        return replace(issue, allowed=", ".join(known), nearest=nearest(issue.key, known))
-    return issue
 
 
 def sensor(

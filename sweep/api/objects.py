@@ -17,7 +17,7 @@ from ..designs.space import Space
 from ..metrics.quantity import Column, Quantity
 from ..search.upper_bound import UpperBound
 from ..study import Study
-from .inline_curves import CurveLike, filter_on_grid, on_grid, wavelength_table
+from .inline_curves import CurveLike, filter_on_grid, wavelength_table
 from .own_designs import are_parameters, designs_of_curves, designs_of_parameters, evaluate_spaces, plain_and_named
 from .user_filters import (
     any_filter_search,
@@ -32,9 +32,6 @@ from .user_filters import (
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray
-    from colour import MultiSpectralDistributions
-    from matplotlib.figure import Figure
 
     from ..report import Output
 
@@ -230,21 +227,6 @@ class LoadedStudy:
             raise SweepError(ValidationIssue(f"no upper bound: {reason}"))
         return limit
 
-    def plot(self, **channels: CurveLike) -> Figure:
-        """Draw the sensor's QE over the spectra of the lights, and further curves by name, as a Matplotlib figure."""
-        from ..report.panels import Curves, figure_of
-        from ..report.tables import Axis
-
-        study = self.study
-        user = {f"{name} (own)": on_grid(name, curve, study.grid)[0] for name, curve in channels.items()}
-        peak_one = study.lights.photons / study.lights.photons.max(axis=1, keepdims=True)
-        lamps = {kind: peak_one[at].max(axis=0) for kind, at in study.lights.members.items()}
-        curves, nodes = {**study.sensor.qe, **user}, study.grid.nodes_nm
-        across = Axis("wavelength", "nm", float(nodes[0]), float(nodes[-1]))
-        top = Axis(high=1.1 * max(float(curve.max()) for curve in curves.values()))
-        title = f"Quantum efficiency of {study.sensor.name}"
-        return figure_of(Curves(title, across, top, next(iter(user), ""), nodes, curves, lamps))
-
     def plan(self, tolerance_dn: float | None = None) -> LoadedStudy:
         """Return the study with a plan of effects for each scenario.
 
@@ -362,41 +344,6 @@ class FinishedRun:
 
         columns: Mapping[str, Column] = self.output.columns
         return with_units(pa.concat_tables(Manifest(self.folder).batches()).unify_dictionaries().to_pandas(), columns)
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the quantities of all designs over design and scenario, with units and meanings.
-
-        Returns
-        -------
-        xarray.Dataset
-            A variable per quantity over ``design`` (its `filter_id`) and ``scenario``; parameters, names, families and
-            CFAs are coordinates along ``design``. Needs the package xarray (``pip install cfa-sweep[xarray]``).
-        """
-        from .conversions import to_xarray
-
-        return to_xarray(self.table, self.output)
-
-    def to_multispectral(self, design: str | int = "best") -> MultiSpectralDistributions:
-        """Return the QE of a design's channels as colour-science has it.
-
-        Parameters
-        ----------
-        design : str or int
-            A `filter_id`, a name (paper_N4, RGGB), or best.
-
-        Returns
-        -------
-        colour.MultiSpectralDistributions
-            A column per channel over nm.
-
-        Raises
-        ------
-        SweepError
-            If there is no such design.
-        """
-        from .conversions import to_multispectral
-
-        return to_multispectral(self.output, self.study.study, design)
 
     @property
     def best(self) -> pd.Series:

@@ -21,7 +21,9 @@ ITSELF["pixel"] = ITSELF
 
 
 def study() -> Any:
-    return sweep.make_study(cfas=["RGGB", "RYNCy"], channel="N", base="Y", to="G")
+    return sweep.make_study(
+        cfas=["RGGB", "RYNCy"], boxes={"edges": {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": "G"}}
+    )
 
 
 def table(*names: object) -> pd.DataFrame:
