@@ -50,7 +50,7 @@ def load_study(
     if chosen is not None:
         several.choose(document, chosen)
     section, partial = _checked(document)
-    if chosen is not None and (max(chosen.indices) >= 0 or chosen.pixel):
+    if chosen is not None:
         section, notes = several.narrowed(section, chosen)
         if len(members) > 1:
             section = section.model_copy(update={"study": chosen.name})
@@ -59,7 +59,10 @@ def load_study(
     folders = [path.parent] if data is None else [data, path.parent]
     sources = Sources(document, section.wavelengths, folders, stored, allow_code=allow_code, partial=partial)
     sources.warnings += notes
-    return resolve(section, sources)
+    try:
+        return resolve(section, sources)
+    except StudyError as error:
+        raise (error if chosen is None or len(members) == 1 else several.of_member(error, chosen)) from None
 
 
 def sensor_studies_in(path: Path, changes: Mapping[str, Any] = {}) -> SensorStudies | None:

@@ -45,6 +45,7 @@ MOST_TYPES = 40
 """Signal types of a study; 780 pairs of them have columns of their own."""
 
 
+@with_keys_of_features
 class CfaSection(Section):
     """Color filter array: its smallest repeated tile."""
 

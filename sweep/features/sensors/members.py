@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import fnmatch
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
-from ...base.errors import StudyError, SweepError
+from ...base.errors import StudyError, nearest
 from ...camera.pixel import merged
-from ...camera.sensor import BUILT_IN_SENSORS, own_red
+from ...camera.sensor import BUILT_IN_SENSORS
 from ...spectra.builtin.measured_sets import LUXEON, SENSORS
+from ...spectra.spectrum import WavelengthGrid
 from ...study.document import Document
 from ...study.members import SensorAndLights
-from ...study.schema import Modification, StudySection
+from ...study.schema import StudySection
 
 _MOST = 200
-_SURROGATE_CURVES = ("C", "R", "G", "B", "Y", "Cy", "Rx")
 _MEASURED = {**SENSORS, "luxeon": LUXEON}
-_SPACES = ("cfas", "designs", "sweeps", "boxes")
+_SPACES = ("cfas", "designs", "sweeps", "boxes", "clouds")
 
 
 def members_of(document: Document) -> list[SensorAndLights]:
@@ -31,6 +34,7 @@ def members_of(document: Document) -> list[SensorAndLights]:
     document.expand("sensors", BUILT_IN_SENSORS)
     sensors, lights = _listed(document, "sensors", data.get("sensor")), _listed(document, "lights", data.get("lights"))
     pixels = _pixels(document)
+    _check_only(document, [*dict.fromkeys([*(name for name, _ in sensors), *BUILT_IN_SENSORS])])
     if (count := len(sensors) * len(lights) * len(pixels)) > _MOST:
         allowed = f"at most {_MOST} sensors times pixels times lights"
         raise StudyError(document.issue(("sensors",), "too many", count, allowed))
@@ -38,6 +42,18 @@ def members_of(document: Document) -> list[SensorAndLights]:
         SensorAndLights(f"{sensor} {pixel}".strip(), light_set, (i, k), pixel)
         for (sensor, i), pixel, (light_set, k) in product(sensors, pixels, lights)
     ]
+
+
+def _check_only(document: Document, known: Sequence[str]) -> None:
+    """Check that CFAs that are for some sensors name some that there are."""
+    cfas = document.data.get("cfas")
+    for name, cfa in cfas.items() if isinstance(cfas, dict) else ():
+        only = cfa.get("only") if isinstance(cfa, dict) else None
+        for at, pattern in enumerate(only if isinstance(only, list) else ()):
+            if not fnmatch.filter(known, str(pattern)):
+                near = nearest(pattern, known)
+                path = ("cfas", name, "only", at)
+                raise StudyError(document.issue(path, "unknown sensor", pattern, ", ".join(known), near))
 
 
 def _pixels(document: Document) -> list[str]:
@@ -103,82 +119,56 @@ def choose(document: Document, member: SensorAndLights) -> None:
 
 
 def narrowed(section: StudySection, member: SensorAndLights) -> tuple[StudySection, list[str]]:
-    """Return a member's study: the wavelengths that its curves have, and the CFAs that the sensor has.
+    """Return a member's study: the wavelengths that its curves have, and the CFAs and filters that are for its sensor.
 
     `section`: the whole study with this member's sensor and lights. Returns `notes`: what was left out.
     """
-    grid, notes = section.wavelengths, list[str]()
-    ends = [_MEASURED[n].range_nm for n in (section.sensor.builtin, section.lights.builtin) if n in _MEASURED]
-    low = max([grid.start_nm, *(low for low, _ in ends)])
-    high = min([grid.stop_nm, *(high for _, high in ends)])
-    if (low, high) != (grid.start_nm, grid.stop_nm):
-        start = grid.start_nm + grid.step_nm * math.ceil((low - grid.start_nm) / grid.step_nm)
-        stop = start + grid.step_nm * math.floor((high - start) / grid.step_nm)
-        if stop <= start:  # left as it is, for the error of what has no curves there
-            return section, []
-        grid = grid.model_copy(update={"start_nm": start, "stop_nm": stop})
-        notes.append(f"{member.sensor}: curves from {start:g} to {stop:g} nm")
+    several, notes = max(member.indices) >= 0 or bool(member.pixel), list[str]()
+    grid = _measured_range(section) if several else section.wavelengths
+    if grid is not section.wavelengths:
+        notes.append(f"{member.sensor}: curves from {grid.start_nm:g} to {grid.stop_nm:g} nm")
+    sensor = member.sensor.removesuffix(f" {member.pixel}")
+    gone = [name for name, cfa in section.cfas.items() if not _is_for(cfa.key("only"), sensor)]
     changes: dict[str, Any] = {"wavelengths": grid}
-    names = _curve_names(section)
-    if names is not None:
-        changes |= _buildable(section, names)
-        gone = [name for key in _SPACES for name in getattr(section, key) if name not in changes[key]]
-        if gone:
-            left_out = ", ".join(dict.fromkeys(gone))
-            notes.append(f"{member.sensor}: without {left_out}, whose curves {member.sensor} does not have")
-        before, after = section.search, changes.get("search", section.search)
-        if before is not None and after is not before:
-            notes.append(f"{member.sensor}: {'no search' if after is None else f'the search is of {after.space}'}")
+    for key in _SPACES:
+        entries = getattr(section, key)
+        of_cfa = {name: name if key in ("cfas", "clouds") else entry.cfa for name, entry in entries.items()}
+        changes[key] = {name: entry for name, entry in entries.items() if of_cfa[name] not in gone}
+    left_out = dict.fromkeys(name for key in _SPACES for name in getattr(section, key) if name not in changes[key])
+    if left_out:
+        notes.append(f"{member.sensor}: without {', '.join(left_out)}")
+    if section.search is not None and not {**changes["sweeps"], **changes["boxes"]} and left_out:
+        notes.append(f"{member.sensor}: no search")
+        changes["search"] = None
+    elif section.search is not None and section.search.space in left_out:
+        changes["search"] = section.search.model_copy(update={"space": None})
     return section.model_copy(update=changes), notes
 
 
-def _curve_names(section: StudySection) -> set[str] | None:
-    """Return the curves of the sensor; None of one that a package offers."""
-    names = {column for entry in section.sensor.files for column in entry.columns}
-    match section.sensor.builtin:
-        case None:
-            return names
-        case name if name in SENSORS:
-            return names | set(SENSORS[name].names)
-        case name:
-            return names | set(_SURROGATE_CURVES) if name in BUILT_IN_SENSORS else None
+def _measured_range(section: StudySection) -> WavelengthGrid:
+    """Return the wavelengths of a study that its measured sensor and lights have; all, for an error, where none."""
+    grid = section.wavelengths
+    ends = [_MEASURED[n].range_nm for n in (section.sensor.builtin, section.lights.builtin) if n in _MEASURED]
+    low = max([grid.start_nm, *(low for low, _ in ends)])
+    high = min([grid.stop_nm, *(high for _, high in ends)])
+    if (low, high) == (grid.start_nm, grid.stop_nm):
+        return grid
+    start = grid.start_nm + grid.step_nm * math.ceil((low - grid.start_nm) / grid.step_nm)
+    stop = start + grid.step_nm * math.floor((high - start) / grid.step_nm)
+    return grid.model_copy(update={"start_nm": start, "stop_nm": stop}) if start < stop else grid
 
 
-def _buildable(section: StudySection, names: set[str]) -> dict[str, Any]:
-    """Return CFAs, filters and search without those that need curves of other sensors.
+def _is_for(only: Sequence[str] | None, sensor: str) -> bool:
+    """Return whether a CFA is for a sensor; without `only` it is for all."""
+    return not only or any(fnmatch.fnmatchcase(sensor, pattern) for pattern in only)
 
-    A name that no sensor has is a mistake, and stays for its error.
-    """
-    others = {*_SURROGATE_CURVES, *(curve for measured in SENSORS.values() for curve in measured.names)} - names
-    variants = own_red(names) if section.sensor.builtin is not None else {}
 
-    def is_buildable(entry: Modification) -> bool:
-        return not others & {entry.base, entry.to if isinstance(entry.to, str) else None}
-
-    filters = {
-        key: {name: entry for name, entry in getattr(section, key).items() if is_buildable(entry)}
-        for key in ("designs", "sweeps", "boxes")
-    }
-    modified = {(e.cfa, channel) for entries in filters.values() for e in entries.values() for channel in e.channel}
-    cfas = {}
-    for name, cfa in section.cfas.items():
-        try:
-            channels = cfa.mosaic(name).channels
-        except SweepError:  # stays for its error
-            channels = ()
-        curves = {c: cfa.curves.get(c, variants.get(name, {}).get(c, c)) for c in channels}
-        if all(curve not in others or (name, channel) in modified for channel, curve in curves.items()):
-            cfas[name] = cfa
-    filters = {
-        key: {n: e for n, e in entries.items() if e.cfa in cfas or e.cfa not in section.cfas}
-        for key, entries in filters.items()
-    }
-    filters["clouds"] = {n: c for n, c in section.clouds.items() if n in cfas or n not in section.cfas}
-    searched = {**filters["sweeps"], **filters["boxes"]}
-    space_name = None if section.search is None else section.search.space
-    if section.search is None or space_name is None or space_name in searched:
-        return {"cfas": cfas, **filters} | ({"search": None} if not searched else {})
-    named_anywhere = space_name in {**section.sweeps, **section.boxes}
-    instead = next(iter(searched), None) if named_anywhere else space_name
-    search = None if instead is None else section.search.model_copy(update={"space": instead})
-    return {"cfas": cfas, **filters, "search": search}
+def of_member(error: StudyError, member: SensorAndLights) -> StudyError:
+    """Return what is wrong with a member, with its name."""
+    issues = []
+    for issue in error.issues:
+        allowed = issue.allowed
+        if issue.problem.startswith("no curve for channel"):
+            allowed = f"`only: [SENSOR, ...]` of the CFA; or {allowed}"
+        issues.append(replace(issue, problem=f"{member.sensor}: {issue.problem}", allowed=allowed))
+    return StudyError(issues)

@@ -18,4 +18,11 @@ class Keys(Section):
     """Several pixels: one run for each, and their comparison; NAME: keys that differ from `pixel`, or captures."""
 
 
-KEYS = {"StudySection": Keys}
+class CfaKeys(Section):
+    """Keys of a CFA."""
+
+    only: list[Name] = []
+    """Sensors of `sensors` that the CFA and its filters are for, with `*` for any letters; left out, all."""
+
+
+KEYS = {"StudySection": Keys, "CfaSection": CfaKeys}

@@ -115,8 +115,8 @@ sensors: [ar0820, opencam, ar0132at]
 lights: [tl16, luxeon]
 cfas:
   RGGB:
-  RYNCy:
-  RGBN: {tile: [[R, G], [B, N]]}
+  RYNCy: {only: [ar0820, opencam]}
+  RGBN: {tile: [[R, G], [B, N]], only: [ar0132*]}
 designs:
   paper_N4: {cfa: RYNCy, channel: N, base: Y, to: G, at: paper_N4}
 boxes:
@@ -129,7 +129,7 @@ boxes:
   clear: {cfa: RGBN, channel: N, base: C, to: G, box: *edges}
 uncertainty: {gain: 0.03, draws: 200}
 constraints: {sensitivity: {min: 0.9}}
-search: {space: yellow, starts: 2, max_evaluations: 60}
+search: {starts: 2, max_evaluations: 60}
 """
 
 
@@ -177,11 +177,14 @@ def test_filters_for_several_sensors_are_the_worst_on_them(several: Path) -> Non
 @pytest.mark.parametrize(
     ("old", "new", "line"),
     [
-        ("opencam, ar0132at]", "opencm]", "few.yaml:4: sensor: unknown"),
+        ("opencam, ar0132at]", "opencm]", "few.yaml:4: sensor: opencm: unknown"),
         ("opencam, ar0132at]", "ar0820]", "few.yaml:4: sensors: one is named twice"),
         ("[ar0820, opencam, ar0132at]", "[]", "few.yaml:4: sensors: an empty list"),
         ("sensors: [ar0820", "sensor: ar0820\nsensors: [ar0820", "sensors: beside `sensor`"),
         ("base: C, to: G, box", "base: CC, to: G, box", "boxes.clear.base"),
+        ("only: [ar0132*]", "only: [ar0133at]", "few.yaml:9: cfas.RGBN.only[0]: unknown sensor"),
+        ("{only: [ar0820, opencam]}", "", "few.yaml:11: designs.paper_N4.base: ar0132at: unknown curve"),
+        ("opencam]}\n", "opencam]}\n  RYYCy:\n", "cfas.RYYCy: ar0132at: no curve for channel 'Y'; allowed: `only: [S"),
     ],
 )
 def test_a_mistake_is_one_line(tmp_path: Path, old: str, new: str, line: str) -> None:
