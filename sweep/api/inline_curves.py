@@ -66,7 +66,9 @@ def wavelength_table(wavelength_nm: PerWavelength, columns: Mapping[Any, PerWave
 def to_curves(name: str, curve: CurveLike) -> Curves:
     """Convert one curve to samples over its own wavelengths."""
     if isinstance(curve, Path | str):
-        return _curve_in_file(name, Path(curve))
+        curves, column = only_column(name, Path(curve))
+        units = {name: curves.units[column]}
+        return Curves(curves.wavelength_nm, {name: curves.values[column]}, str(curve), units=units)
     if isinstance(curve, tuple) and len(curve) == 2:
         wavelength_nm, values = curve
     else:
@@ -160,11 +162,11 @@ def _named(error: DataError, name: str) -> DataError:
     return DataError([ValidationIssue(f.problem, None, None, name, f.value, f.allowed) for f in error.issues])
 
 
-def _curve_in_file(name: str, path: Path) -> Curves:
+def only_column(name: str, path: Path) -> tuple[Curves, str]:
+    """Return the curve of a file with its column; raises DataError if it has several."""
     curves = formats.read_curves(path)
     if len(curves.values) != 1:
         shown = ", ".join(list(curves.values)[:10])
         allowed = f'one of them: sweep.read_curves("{path}")["NAME"]'
         raise DataError(ValidationIssue("a file of several curves", str(path), None, name, shown, allowed))
-    (column,) = curves.values
-    return Curves(curves.wavelength_nm, {name: curves.values[column]}, str(path), units={name: curves.units[column]})
+    return curves, next(iter(curves.values))

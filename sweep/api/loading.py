@@ -18,7 +18,7 @@ from ..spectra.light_files import lights_file
 from ..spectra.spectrum import Curves
 from ..study.shipped import shipped_names, study_path
 from .channels import sensor_file
-from .inline_curves import CurveLike, columns_of, table_to_curves, to_curves
+from .inline_curves import CurveLike, columns_of, only_column, table_to_curves, to_curves
 from .objects import FinishedRun, LoadedStudy
 
 if TYPE_CHECKING:
@@ -230,10 +230,14 @@ def sensor_source(
         keys = sensor_file(Path(source)).keys(lambda path: str(path.absolute()))
     elif source is not None:
         keys["builtin"] = str(source)
-    curves = {f"curve {channel}": to_curves(channel, curve) for channel, curve in channels.items()}
-    relative = {} if relative_to is None else {"relative_to": relative_to}
-    entries = [{"file": file, "columns": {c: c}, **relative} for file, c in zip(curves, channels, strict=True)]
-    keys["files"] = [*keys["files"], *entries]
+    curves, relative = dict[str, Curves](), {} if relative_to is None else {"relative_to": relative_to}
+    for channel, curve in channels.items():
+        if isinstance(curve, Path | str):
+            file, column = str(Path(curve).absolute()), only_column(channel, Path(curve))[1]
+        else:
+            file, column = f"curve {channel}", channel
+            curves[file] = to_curves(channel, curve)
+        keys["files"].append({"file": file, "columns": {channel: column}, **relative})
     if not keys["files"] and name is None and clear is None:
         return CurveSource(keys)
     return CurveSource(keys | {k: v for k, v in {"name": name, "clear": clear}.items() if v is not None}, curves)

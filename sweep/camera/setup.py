@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from uuid import uuid4
 from weakref import WeakValueDictionary
 
-from ..base.types import MemberNumbers, PerWavelength
+from ..base.types import MemberNumbers
 from ..spectra.lights import Lights
 from ..spectra.population import stated_yield
 from .accuracy import STANDARD, Accuracy
@@ -31,11 +31,6 @@ class Feature:
     def columns(self) -> Hashable:
         """What its columns depend on."""
         return True
-
-    @property
-    def curves(self) -> Mapping[tuple[str, str], PerWavelength]:
-        """Curves of files, by owner and name, that a run keeps."""
-        return {}
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 from ..base.modules import lazy_import
 
 if TYPE_CHECKING:
-    from ..results.designs import check_kept, study_of
+    from ..results.designs import study_of
     from ..results.output import Output, read_output
     from .page import make_report, summary_lines
 
 __all__ = [
     "Output",
-    "check_kept",
     "make_report",
     "read_output",
     "study_of",
@@ -24,7 +23,6 @@ __getattr__ = lazy_import(
     globals(),
     {
         "Output": "..results.output",
-        "check_kept": "..results.designs",
         "make_report": ".page",
         "read_output": "..results.output",
         "study_of": "..results.designs",

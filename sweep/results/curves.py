@@ -10,9 +10,9 @@ import pyarrow as pa
 
 from ..base.types import Array, Float, FloatArray, PerWavelength
 
-_QE, _LIGHT, _TASK, _DESIGN, _ON_FRONT, _LIMIT = "qe", "light", "task", "design", "front", "upper_bound"
+_QE, _LIGHT, _DESIGN, _ON_FRONT, _LIMIT = "qe", "light", "design", "front", "upper_bound"
 _COLORANT = "colorant"
-"""Kinds: of the sensor; of a signal; of an own task's file; a modified channel of a design that is drawn, or of one on
+"""Kinds: of the sensor; of a signal; a modified channel of a design that is drawn, or of one on
 the front; of the limit; the absorbance of a colorant, relative to its peak."""
 _WORD = pa.dictionary(pa.int32(), pa.string())
 SCHEMA = pa.schema(
@@ -26,8 +26,7 @@ SCHEMA = pa.schema(
         pa.field("channel", _WORD),
     ]
 )
-"""`curve`: its name, the CFA's of a limit, `<design_id> <channel>` of a design. `signal_type`: of a task's spectrum its
-task and class."""
+"""`curve`: its name, the CFA's of a limit, `<design_id> <channel>` of a design."""
 FilterCurves = dict[str, FloatArray]
 """Modified channel -> QE."""
 
@@ -37,8 +36,8 @@ class KeptCurves:
     """Curves of a run.
 
     QE of the sensor by name, photons per nm by type and name of the signal, QE of the designs that are drawn and of
-    others on the front by `design_id` and channel, of the limit's filter by CFA, curves of features that are from
-    files by task and class, and by file and column, absorbances of colorants in the order of their numbers.
+    others on the front by `design_id` and channel, of the limit's filter by CFA, absorbances of colorants in the order
+    of their numbers.
     """
 
     wavelength_nm: PerWavelength
@@ -47,7 +46,6 @@ class KeptCurves:
     drawn: dict[int, FilterCurves] = field(default_factory=dict)
     on_front: dict[int, FilterCurves] = field(default_factory=dict)
     limits: dict[str, PerWavelength] = field(default_factory=dict)
-    features: dict[tuple[str, str], PerWavelength] = field(default_factory=dict)
     colorants: dict[str, PerWavelength] = field(default_factory=dict)
 
     @property
@@ -66,7 +64,6 @@ class KeptCurves:
     def _rows(self) -> Iterator[tuple[str, str, PerWavelength, str | None, int | None, str | None]]:
         yield from ((_QE, name, values, None, None, None) for name, values in self.sensor.items())
         yield from ((_LIGHT, name, values, kind, None, None) for (kind, name), values in self.lights.items())
-        yield from ((_TASK, name, values, owner, None, None) for (owner, name), values in self.features.items())
         for what, designs in ((_DESIGN, self.drawn), (_ON_FRONT, self.on_front)):
             for design_id, channels in designs.items():
                 for channel, values in channels.items():
@@ -110,8 +107,8 @@ class KeptCurves:
             if kind in (_DESIGN, _ON_FRONT):
                 designs = curves.drawn if kind == _DESIGN else curves.on_front
                 designs.setdefault(row["design_id"], {})[row["channel"]] = curve
-            elif kind in (_LIGHT, _TASK):
-                (curves.lights if kind == _LIGHT else curves.features)[owner, name] = curve
+            elif kind == _LIGHT:
+                curves.lights[owner, name] = curve
             else:
                 {_QE: curves.sensor, _COLORANT: curves.colorants}.get(kind, curves.limits)[name] = curve
         return curves

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from ..base.errors import OutputError, SweepError, ValidationIssue, nearest
-from ..base.types import Array, Float, PerWavelength, SameShape
+from ..base.types import Array, Float, PerWavelength
 from ..base.user_code import CODE_OF, is_code
 from ..designs.space import Space
 from ..study import Study, load_study
 from ..study.axes import series_of
-from ..study.sources import KeptSources
 from .manifest import Manifest
 from .tables import NAMED_KINDS, RESOLVED, RESULTS
 
@@ -27,9 +26,6 @@ if TYPE_CHECKING:
 
 BEST = "best"
 _MOST_SHOWN = 10
-_SAME = 1e-12
-"""Largest difference of curves that were computed on two machines."""
-_Key = TypeVar("_Key")
 
 
 def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
@@ -125,8 +121,8 @@ def find_design_row(output: Output, design: str | int) -> Mapping[Any, Any]:
 def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> Study:
     """Make the study of a finished run again.
 
-    `data`: folder of the study's files; without it the curves that the run kept are taken. Raises OutputError: code is
-    not allowed, or the curves are not those of the run. Raises StudyError: the code is another one.
+    `data`: folder of the study's files; without it those that the run kept are taken. Raises OutputError: code is not
+    allowed, or the files are not those of the run. Raises StudyError: the code is another one.
     """
     path, digests = output.folder / RESOLVED, output.provenance.data_sha256
     code = {name: digest for name, digest in digests.items() if is_code(name)}
@@ -136,43 +132,8 @@ def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> 
         whose = ", ".join(in_files or [name.removeprefix(CODE_OF) for name in code])
         problem = f"it was made with the code of {whose}"
         raise OutputError(ValidationIssue(problem, str(output.folder), allowed=f"{where}--allow-code, if you trust it"))
-    stored = output.curves
-    if data is None and digests.keys() - code:
-        return load_study(
-            path, stored=KeptSources(stored.sensor, stored.lights, stored.features, stored.colorants), allow_code=code
-        )
     study = load_study(path, data, allow_code=code)
-    lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
-    check_kept(output, stored.sensor, study.sensor.qe)
-    check_kept(output, stored.lights, {(kind, name): values for kind, name, values in lights})
-    colorants = study.colorants
-    check_kept(
-        output,
-        stored.colorants,
-        {} if colorants is None else dict(zip(colorants.names, colorants.absorbance, strict=True)),
-    )
-    check_kept(output, stored.features, curves_of_features(study))
+    if other := [name for name, digest in study.digests.items() if digests.get(name) != digest]:
+        problem = f"not the files of the run: {', '.join(other)}"
+        raise OutputError(ValidationIssue(problem, str(output.folder), allowed="those that it was made from"))
     return study
-
-
-def curves_of_features(study: Study) -> dict[tuple[str, str], PerWavelength]:
-    """Return the curves of files that features of a study have, by owner and name."""
-    return {key: curve for feature in study.features.values() for key, curve in feature.curves.items()}
-
-
-def check_kept(output: Output, stored: Mapping[_Key, PerWavelength], computed: Mapping[_Key, PerWavelength]) -> None:
-    """Compare curves with those that the run kept.
-
-    Raises OutputError if they differ.
-    """
-
-    def same(first: SameShape, second: SameShape) -> bool:
-        return first.shape == second.shape and bool(np.abs(first - second).max(initial=0.0) <= _SAME)
-
-    different = [str(name) for name, values in computed.items() if name in stored and not same(stored[name], values)]
-    if different:
-        shown = ", ".join(different[:_MOST_SHOWN]) + (" and more" if len(different) > _MOST_SHOWN else "")
-        problem = f"computed again, these differ from the run: {shown}"
-        raise OutputError(
-            ValidationIssue(problem, str(output.folder), allowed="the curve files and the version of that run")
-        )

@@ -11,6 +11,7 @@ from ..features import gathered
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
 from ..metrics.quantity import DN, UPPER_BOUND, Column, RequestedQuantities
 from ..metrics.registry import every_feature, listed
+from ..study.inputs import INPUTS
 from . import tables as files
 from .curves import SCHEMA
 from .shown import MOST_POINTS
@@ -142,6 +143,7 @@ FILES = {
     "reaches the threshold of each capture (from 1 on), or saturation of the last one; inf: at none of the series, "
     "-inf: at all",
     files.RESOLVED: "the study with every default written out; a study file itself",
+    INPUTS: "the files of curves that the study was made from, with which `study.resolved.yaml` runs anywhere",
     files.PROVENANCE: "versions, seed, command, machine, plans of the scenes, meanings of the columns",
     files.REPORT: "the report: one file that you can send, without the network",
     "pareto.png": "the filter over the lamps, and separation against the light of all CFAs; also `.svg`",

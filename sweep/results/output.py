@@ -22,6 +22,7 @@ from ..metrics.columns.exposure import EXPOSURE
 from ..metrics.objective import Objective
 from ..metrics.quantity import Column
 from ..study import StudySection, folder_name
+from ..study.inputs import INPUTS
 from . import tables as files
 from .curves import SCHEMA as CURVES_SCHEMA
 from .curves import KeptCurves
@@ -235,7 +236,7 @@ def read_output(folder: Path, *, with_added: bool = True) -> Output:
     table[per_exposure(separation)] = table[separation] / (table[EXPOSURE] * MS)
     more = {
         name: read_table(folder / name).to_pandas()
-        for name in (files.POINTS, files.LIMITED_BY, files.SATURATED, *optional)
+        for name in (files.POINTS, files.LIMITED_BY, files.SATURATED, *(optional - {INPUTS}))
     }
     of_rows = more[files.LIMITED_BY].drop(columns="filter_id", errors="ignore")
     table = table.merge(of_rows, on="design_id", how="left")

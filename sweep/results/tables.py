@@ -18,6 +18,7 @@ from ..base.errors import OutputError, ValidationIssue
 from ..base.types import Bool, BoolArray
 from ..features import gathered
 from ..metrics.quantity import UPPER_BOUND
+from ..study.inputs import INPUTS
 from .atomic import atomic
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ REPORT = "report.html"
 _OF_CORE = frozenset(
     (
         *(DESIGNS, PARETO, SEARCH_LOG, FRONT, CURVES, POINTS, LIMITED_BY, SATURATED, CROSSINGS, WORST, HANDOVERS),
-        *(COMBINATIONS, PROVENANCE, RESOLVED),
+        *(COMBINATIONS, PROVENANCE, RESOLVED, INPUTS),
     )
 )
 _DRAWN = re.compile(r"report\.html|(sensors|cfas|pareto)\.(png|svg)|pareto-\d+\.svg")

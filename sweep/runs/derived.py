@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from ..features import modules
 from ..results.curves import FilterCurves, KeptCurves
-from ..results.designs import curves_of_features, row_curves, row_space
+from ..results.designs import row_curves, row_space
 from ..results.tables import CURVES, LIMITED_BY, POINTS
 from ..study import Study
 from .analysis import RunTable, Shown
@@ -34,7 +34,7 @@ def row_tables(study: Study) -> dict[str, RunTable]:
 
 
 def _curves_table(shown: Shown) -> pa.Table:
-    """Return the curves of sensor, lights, files of user tasks, drawn designs, front and upper bound."""
+    """Return the curves of sensor, lights, drawn designs, front and upper bound."""
     study, limit = shown.study, shown.limit()
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
     limits = {}
@@ -47,7 +47,6 @@ def _curves_table(shown: Shown) -> pa.Table:
         _filters(study, shown.drawn),
         _filters(study, shown.other_front),
         limits,
-        curves_of_features(study),
         {} if study.colorants is None else dict(zip(study.colorants.names, study.colorants.absorbance, strict=True)),
     ).table()
 

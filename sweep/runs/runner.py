@@ -48,6 +48,7 @@ from ..search.problem import CONVERGED
 from ..search.upper_bound import UpperBound
 from ..study import Study
 from ..study.goals import refuse_unreachable
+from ..study.inputs import INPUTS, archive_of
 from .analysis import Shown
 from .check import check_run
 from .derived import row_tables
@@ -81,7 +82,13 @@ _CHECK_S, _CHECK_SHARE = 0.5, 0.05
 
 def files_of(study: Study) -> set[str]:
     """Return the names of the files that a run makes."""
-    return {RESOLVED, *_whole(study), *row_tables(study)}
+    return {*_inputs(study), *_whole(study), *row_tables(study)}
+
+
+def _inputs(study: Study) -> dict[str, bytes]:
+    """Return the study as a run keeps it, with the files that it was made from."""
+    archive = {INPUTS: archive_of(study.inputs)} if study.inputs else {}
+    return {RESOLVED: resolved_yaml(study).encode("utf-8"), **archive}
 
 
 def _whole(study: Study) -> set[str]:
@@ -188,7 +195,7 @@ class _Run:
             self._search_and_sweep()
         if wrong & row_tables(study).keys():
             self._write_row_tables(wrong)
-        self.manifest.write({RESOLVED: resolved_yaml(study).encode("utf-8")})
+        self.manifest.write(_inputs(study))
         if PROVENANCE in wrong:
             facts = self._provenance().model_dump(mode="json")
             self.manifest.write({PROVENANCE: json_of(facts).encode("utf-8")})

@@ -4,10 +4,8 @@ from .load import folder_name, load_study, sensor_studies_in, study_of_keys
 from .members import SensorAndLights, SensorStudies
 from .model import Search, Study
 from .schema import StudySection
-from .sources import KeptSources
 
 __all__ = [
-    "KeptSources",
     "Search",
     "SensorAndLights",
     "SensorStudies",

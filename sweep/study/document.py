@@ -45,6 +45,8 @@ _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\
 _LOOKS_LIKE_A_NUMBER = re.compile(r"[-+.]*[0-9][-+.0-9xo_a-fA-F]*")
 _SURROGATE = re.compile("[\ud800-\udfff]")
 """Half of a character: `\\ud800`. No file takes it."""
+RESOLVED = ".resolved.yaml"
+"""Ends the names of studies that runs write."""
 _NOT_ALLOWED = "not allowed"
 _MOST_NAMED = 8
 _GONE = {
@@ -261,7 +263,7 @@ class Document:
 
     def __init__(self, source: Path | Mapping[str, Any]) -> None:
         self.file = str(source) if isinstance(source, Path) else None
-        resolved = isinstance(source, Path) and source.name.endswith(".resolved.yaml")
+        resolved = isinstance(source, Path) and source.name.endswith(RESOLVED)
         most_bytes, most_values = _MOST_RESOLVED if resolved else _MOST
         text = _text(source, most_bytes) if isinstance(source, Path) else yaml_text(source)
         self.data: dict[str, Any] = Tree(text, self.file, most_values).root

@@ -116,10 +116,7 @@ def lights_of(section: LightsSection, sources: Sources, at: KeyPath = ("lights",
             for position, column in enumerate(columns):
                 found_path = (*files, index, "signals", signal_type, position)
                 label = f"{Path(entry.file).stem}:{column}"
-                if sources.stored is not None:
-                    photons = sources.stored_curve(found_path, sources.stored.lights, (signal_type, label))
-                else:
-                    photons = sources.photons(found_path, curves, column, entry)
+                photons = sources.photons(found_path, curves, column, entry)
                 if photons is not None:
                     by_type.setdefault(signal_type, []).append((label, signal_type, photons))
     if len(sources.issues) > before:

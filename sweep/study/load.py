@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -13,19 +14,19 @@ from ..base.disk import is_folder
 from ..base.errors import StudyError, ValidationIssue
 from ..features import modules
 from ..spectra.spectrum import Curves
-from .document import Document
+from .document import RESOLVED, Document
+from .inputs import INPUTS, unpacked
 from .members import SensorAndLights, SensorStudies, of_one_fit
 from .model import Study
 from .partial import Partial
 from .resolve import resolve
 from .schema import StudySection
-from .sources import KeptSources, Sources
+from .sources import Sources
 
 
 def load_study(
     path: Path,
     data: Path | None = None,
-    stored: KeptSources | None = None,
     changes: Mapping[str, Any] = {},
     *,
     allow_code: bool | Mapping[str, str] = False,
@@ -33,10 +34,10 @@ def load_study(
 ) -> Study:
     """Read and check a study file.
 
-    `stored`: curves on that grid to take instead of those in files; `changes`: dotted key -> value to take instead, as
-    a study file would have it. Files are looked for in `data` first, then beside the study. With `allow_code` code
-    that the study names may run, or only code with these digests. Raises StudyError with one issue per problem:
-    file:line, key, value, allowed values, nearest name.
+    `changes`: dotted key -> value to take instead, as a study file would have it. Files are looked for in `data` first,
+    then beside the study; those of a run's study in its archive. With `allow_code` code that the study names may run,
+    or only code with these digests. Raises StudyError with one issue per problem: file:line, key, value, allowed
+    values, nearest name.
     """
     document = _changed(path, changes)
     several: Any = next(iter(modules("members")), None)
@@ -57,12 +58,15 @@ def load_study(
     if data is not None and not is_folder(data):
         raise StudyError(ValidationIssue("no such folder", None, None, "--data", str(data)))
     folders = [path.parent] if data is None else [data, path.parent]
-    sources = Sources(document, section.wavelengths, folders, stored, allow_code=allow_code, partial=partial)
+    sources = Sources(document, section.wavelengths, folders, allow_code=allow_code, partial=partial)
     sources.warnings += notes
-    try:
-        return resolve(section, sources)
-    except StudyError as error:
-        raise (error if chosen is None or len(members) == 1 else several.of_member(error, chosen)) from None
+    with ExitStack() as stack:
+        if data is None and path.name.endswith(RESOLVED):
+            sources.kept, sources.given = stack.enter_context(unpacked(path.with_name(INPUTS)))
+        try:
+            return resolve(section, sources)
+        except StudyError as error:
+            raise (error if chosen is None or len(members) == 1 else several.of_member(error, chosen)) from None
 
 
 def sensor_studies_in(path: Path, changes: Mapping[str, Any] = {}) -> SensorStudies | None:
@@ -98,7 +102,8 @@ def study_of_keys(
     """
     document = Document(keys)
     section, partial = _checked(document)
-    return resolve(section, Sources(document, section.wavelengths, [folder], None, given, allow_code, partial))
+    grid = section.wavelengths
+    return resolve(section, Sources(document, grid, [folder], given, allow_code=allow_code, partial=partial))
 
 
 def _checked(document: Document) -> tuple[StudySection, Partial | None]:

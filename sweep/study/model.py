@@ -32,6 +32,7 @@ from ..search.problem import Problem
 from ..spectra.colorants import Colorants
 from ..spectra.lights import Lights, Pair, class_pairs, in_order
 from ..spectra.spectrum import WavelengthGrid
+from .inputs import Input
 from .schema import StudySection
 
 
@@ -83,11 +84,12 @@ class Study:
     user_effects: tuple[UserEffect, ...] = ()
     colorants: Colorants | None = None
     plans: Mapping[str, Plan] = field(default_factory=dict)
+    inputs: Mapping[str, Input] = field(default_factory=dict)
     _setups: dict[tuple[Any, ...], Setup] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a worker is given: it makes setups of its own."""
-        return self.__dict__ | {"_setups": {}}
+        return self.__dict__ | {"_setups": {}, "inputs": {}}
 
     @property
     def pairs(self) -> tuple[Pair, ...]:

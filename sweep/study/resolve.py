@@ -90,6 +90,7 @@ def resolve(section: StudySection, sources: Sources) -> Study:
         constraints=section.constraints,
         search=search,
         digests=dict(sources.digests),
+        inputs=sources.inputs,
         warnings=tuple(sources.warnings),
         features=features,
         user_metrics=metrics or (),

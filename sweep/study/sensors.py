@@ -35,7 +35,7 @@ def sensor_of(section: SensorSection, sources: Sources) -> SensorCurves | None:
     """
     section = offered_curves(sources, ("sensor",), section, "sweep.sensors", BUILT_IN_SENSORS)
     sensor = _sensor(section, sources)
-    if sensor is None or section.ir_cut is None or sources.stored is not None:
+    if sensor is None or section.ir_cut is None:
         return sensor
     entry = CurveFile(file=section.ir_cut, columns={"ir_cut": "ir_cut"})
     curves = sources.curves(("sensor", "ir_cut"), entry)
@@ -114,9 +114,9 @@ def _curves_of_files(
 def _columns(
     sources: Sources, path: KeyPath, entry: CurveFile, factor: float | Float[Array, "#wavelengths"]
 ) -> dict[str, PerWavelength]:
-    """Return the curves of one file on the grid, times a factor; those that a finished run kept have it already."""
+    """Return the curves of one file on the grid, times a factor."""
     use: Use = "sensor" if entry.relative_to is None else "filter"
-    given = FITTING[use][0] if entry.file in sources.given and not sources.given[entry.file].units else None
+    given = FITTING[use][0] if entry.file in sources.given else None
     known = sources.used(
         path,
         entry,
@@ -125,9 +125,9 @@ def _columns(
         entry.quantity or given,
         scaled="scale" in entry.model_fields_set or given is not None,
     )
-    if sources.stored is None and known is None:
+    if known is None:
         return {}
-    if known is not None and entry.relative_to is None:
+    if entry.relative_to is None:
         present = [column for column in entry.columns.values() if column in known.values]
         tops = [float(known.samples(column)[1].max()) for column in present]
         top = max(tops, default=0.0)
@@ -139,13 +139,9 @@ def _columns(
     scaled = {}
     for name, column in entry.columns.items():
         place = (*path, "columns", name)
-        if sources.stored is not None:
-            values = sources.stored_curve(place, sources.stored.sensor, name)
-        else:
-            values = sources.column(place, known, column, entry)
-            values = None if values is None else values * factor
+        values = sources.column(place, known, column, entry)
         if values is not None:
-            scaled[name] = values
+            scaled[name] = values * factor
     return scaled
 
 

@@ -31,6 +31,7 @@ from ..spectra.spectrum import (
 )
 from ..spectra.units import Use, used_as
 from .document import Document, KeyPath, by_line
+from .inputs import Input, input_at, input_given
 from .partial import Partial
 from .schema_curves import ColorantsSection, FileEntry
 
@@ -46,41 +47,28 @@ _MISCOUNTED = 0.01
 """The same of photons that sampling at the nodes loses or adds."""
 _Made = TypeVar("_Made", SensorCurves, Lights)
 _Content = TypeVar("_Content", Curves, ChiefRays)
-_Key = TypeVar("_Key")
-
-
-@dataclass(frozen=True)
-class KeptSources:
-    """Curves of a finished run, on its wavelength grid, which replace those of files.
-
-    QE by name, photon spectra by signal type and name, curves of features by owner and name, absorbances of colorants.
-    """
-
-    sensor: Mapping[str, PerWavelength]
-    lights: Mapping[tuple[str, str], PerWavelength]
-    features: Mapping[tuple[str, str], PerWavelength] = field(default_factory=dict)
-    colorants: Mapping[str, PerWavelength] = field(default_factory=dict)
 
 
 @dataclass
 class Sources:
     """Reader of the files of one study, each once; collects issues, warnings and digests.
 
-    `stored`: the curves of a finished run; no file is read then. `given`: files that are not on a disk, by their names.
+    `given`: files that are not on a disk, by their names; `kept`: where a run kept those that it was made from.
     `allow_code`: code that the study names may run, or only code with these digests. `partial`: of a study with faulty
-    keys, whose issues are told with all others, and for which checks wait.
+    keys, whose issues are told with all others, and for which checks wait. `inputs`: what was read.
     """
 
     document: Document
     grid: WavelengthGrid
     folders: Sequence[Path]
-    stored: KeptSources | None = None
     given: Mapping[str, Curves] = field(default_factory=dict)
+    kept: Mapping[str, Path] = field(default_factory=dict)
     allow_code: bool | Mapping[str, str] = False
     partial: Partial | None = None
     issues: list[ValidationIssue] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)
+    inputs: dict[str, Input] = field(default_factory=dict)
     _read: dict[str, Curves | None] = field(default_factory=dict)
     _waiting: list[ValidationIssue] = field(default_factory=list)
 
@@ -192,25 +180,14 @@ class Sources:
                 self.refuse(Fault(path, f"{entry.file}, column {column}: {issue.problem}", issue.value, issue.allowed))
             return None
 
-    def stored_curve(self, path: KeyPath, curves: Mapping[_Key, PerWavelength], name: _Key) -> PerWavelength | None:
-        """Return a curve stored with a finished run.
-
-        None after adding an issue.
-        """
-        if name not in curves:
-            self.refuse(Fault(path, "the run kept no such curve", name))
-        return curves.get(name)
-
     def curves(self, path: KeyPath, entry: FileEntry) -> Curves | None:
         """Read all curves of a file, once per study."""
-        if self.stored is not None:
-            return None
         if entry.file not in self._read and entry.file in self.given:
             curves = self._read[entry.file] = self.given[entry.file]
             content = hashlib.sha256(curves.wavelength_nm.tobytes())
             for name, values in curves.values.items():
                 content.update(name.encode() + values.tobytes())
-            self.digests[entry.file] = content.hexdigest()
+            self.digests[entry.file], self.inputs[entry.file] = content.hexdigest(), input_given(curves)
         elif entry.file not in self._read:
             self._read[entry.file] = self._content((*path, "file"), entry.file, read_curves)
         return self._read[entry.file]
@@ -246,9 +223,6 @@ class Sources:
     def colorants(self, section: ColorantsSection) -> Colorants | None:
         """Read the catalog of colorants."""
         path: KeyPath = ("colorants", "catalog")
-        if self.stored is not None and self.stored.colorants:
-            stored = self.stored.colorants
-            return Colorants(tuple(stored), np.stack(list(stored.values())), np.ones(len(stored)))
         for name in BUILTIN_COLORANTS.keys() & set(section.catalog):
             if len(section.catalog) > 1:
                 self.refuse(Fault(path, f"the built-in catalog `{name}` goes with no other", section.catalog))
@@ -256,8 +230,7 @@ class Sources:
             return BUILTIN_COLORANTS[name](self.grid)
         places = []
         for name in section.catalog:
-            folder = next((where / name for where in self.folders if is_folder(where / name)), None)
-            place = folder or self.file(path, name)
+            place = self.file(path, name)
             if place is not None:
                 places.append(place)
         if len(places) < len(section.catalog):
@@ -267,6 +240,7 @@ class Sources:
         except DataError as error:
             self.refuse(*faults_of(path, error))
             return None
+        self.inputs |= {name: input_at(place) for name, place in zip(section.catalog, places, strict=True)}
         content = hashlib.sha256("".join(found.names).encode() + found.absorbance.tobytes() + found.peaks.tobytes())
         self.digests[f"colorants: {', '.join(section.catalog)}"] = content.hexdigest()
         total = len(found) + len(found.refused)
@@ -312,7 +286,7 @@ class Sources:
             return None
         try:
             content = read(place)
-            self.digests[file] = digest(place)
+            self.digests[file], self.inputs[file] = digest(place), input_at(place)
         except DataError as error:
             self.issues.extend(error.issues)
             return None
@@ -324,7 +298,8 @@ class Sources:
 
         None after adding an issue.
         """
-        place = next((where / file for where in self.folders if is_file(where / file) or is_folder(where / file)), None)
+        places = [self.kept[file]] if file in self.kept else [where / file for where in self.folders]
+        place = next((place for place in places if is_file(place) or is_folder(place)), None)
         if place is None:
             names: list[str] = []
             for folder in self.folders:

@@ -41,8 +41,7 @@ def tasks_of(section: TasksSection, sources: Sources) -> StudyTasks | None:
             sources.refuse(unknown((*_AT, "shipped"), "task", name, SHIPPED))
     if len(sources.issues) > before:
         return None
-    from_files: dict[tuple[str, str], FloatArray] = {}
-    own_tasks = [_user_task(name, task, from_files, sources) for name, task in section.own.items()]
+    own_tasks = [_user_task(name, task, sources) for name, task in section.own.items()]
     if len(sources.issues) > before:
         return None
     conditions = Conditions(section.exposure_s, section.read_noise_e, section.illuminance_lx)
@@ -50,13 +49,11 @@ def tasks_of(section: TasksSection, sources: Sources) -> StudyTasks | None:
         *(shipped(sources.grid, name) for name in section.shipped),
         *(task for task in own_tasks if task is not None),
     )
-    return StudyTasks(conditions, tasks, from_files)
+    return StudyTasks(conditions, tasks)
 
 
-def _user_task(
-    name: str, task: UserTask, from_files: dict[tuple[str, str], PerWavelength], sources: Sources
-) -> GriddedTask | None:
-    """Return a task, or None after adding issues; its spectra of files go to `from_files`, see `StudyTasks`."""
+def _user_task(name: str, task: UserTask, sources: Sources) -> GriddedTask | None:
+    """Return a task, or None after adding issues."""
     before, at = len(sources.issues), (*_AT, "own", name)
     for light in task.under:
         if light not in ILLUMINANTS:
@@ -78,10 +75,7 @@ def _user_task(
                 sources.refuse(Fault((*path, "file"), "the class has this file already", entry.file))
             else:
                 files.add(entry.file)
-                owner = f"{name} {kind}"
-                read = _read(path, entry, sources) if sources.stored is None else _kept(owner, path, entry, sources)
-                from_files |= {(owner, f"{entry.file}:{column}"): values for column, values in read.items()}
-                spectra += list(read.values())
+                spectra += _read(path, entry, sources)
         classes[kind] = np.array(spectra).reshape(-1, sources.grid.size)
     sizes = [len(spectra) for spectra in classes.values()]
     pairs = (sum(sizes) ** 2 - sum(size**2 for size in sizes)) // 2
@@ -116,32 +110,18 @@ def _check_names(name: str, task: UserTask, path: KeyPath) -> Iterator[Fault]:
         yield Fault((*path, "under"), "lamps are seen by their own light", task.under, "leave it out")
 
 
-def _kept(owner: str, path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, PerWavelength]:
-    """Return the spectra of a file that a finished run kept."""
-    assert sources.stored is not None
-    start = f"{entry.file}:"
-    spectra = {
-        name.removeprefix(start): values
-        for (of, name), values in sources.stored.features.items()
-        if of == owner and name.startswith(start)
-    }
-    if not spectra or not set(entry.columns or ()) <= spectra.keys():
-        sources.refuse(Fault(path, "the run kept no such curve", entry.file))
-    return spectra
-
-
-def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, PerWavelength]:
-    """Return column -> reflectance or relative photons on the grid; a column that is 0 there adds an issue."""
+def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> list[PerWavelength]:
+    """Return reflectance or relative photons of columns on the grid; a column that is 0 there adds an issue."""
     use: Use = "surface" if entry.quantity == "reflectance" else "light"
     curves = sources.used(path, entry, use, entry.columns, entry.quantity, scaled=True)
     if curves is None:
-        return {}
+        return []
     names = list(curves.values) if entry.columns is None else entry.columns
     if len(set(names)) < len(names):
         sources.refuse(Fault((*path, "columns"), "a column is named twice", names))
     if not sources.fits(path, "spectra", len(names)):
-        return {}
-    spectra = {}
+        return []
+    spectra = []
     for name in names:
         if entry.quantity == "reflectance":
             values = sources.column(path, curves, name, entry)
@@ -150,7 +130,7 @@ def _read(path: KeyPath, entry: TaskFile, sources: Sources) -> dict[str, PerWave
         else:
             values = sources.photons(path, curves, name, entry)
         if values is not None:
-            spectra[name] = values
+            spectra.append(values)
     return spectra
 
 

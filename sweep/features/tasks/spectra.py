@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from ...base.types import Array, Float, IndexArray, Int, PerWavelength
+from ...base.types import Array, Float, IndexArray, Int
 from ...camera.setup import Feature, Setup
 
 TaskMetric = Literal["color", "low_light", "separation"]
@@ -107,25 +107,15 @@ class Conditions:
 
 @dataclass(frozen=True)
 class StudyTasks(Feature):
-    """Tasks of a study.
-
-    `tasks`: built-in tasks, then the study's own; `from_files`: spectra read from the study's files, by (`<task>
-    <class>`, `<file>:<column>`): reflectance, or relative photons.
-    """
+    """Tasks of a study: built-in ones, then its own."""
 
     conditions: Conditions
     tasks: tuple[GriddedTask, ...]
-    from_files: Mapping[tuple[str, str], PerWavelength] = field(default_factory=dict)
 
     @property
     def columns(self) -> tuple[TaskColumns, ...]:
         """Columns of each task."""
         return tuple(task.columns for task in self.tasks)
-
-    @property
-    def curves(self) -> Mapping[tuple[str, str], PerWavelength]:
-        """Spectra of files, which a run keeps."""
-        return self.from_files
 
     @property
     def by_name(self) -> Mapping[str, GriddedTask]:

@@ -111,7 +111,6 @@ def test_a_run_keeps_the_spectra_of_user_tasks(tmp_path: Path) -> None:
     code, _, said = commanded("run", tmp_path / "own.yaml", "--output", tmp_path, "--jobs", 1)
     assert code == 0, said
     output = read_output(tmp_path / "tasks")
-    assert list(output.curves.features) == [("paint mine", "paints.csv:white"), ("paint mine", "paints.csv:yellow")]
     first = load_study(tmp_path / "own.yaml").features["tasks"]
     (tmp_path / "paints.csv").unlink()
     again = study_of(output, None).features["tasks"]
@@ -119,5 +118,5 @@ def test_a_run_keeps_the_spectra_of_user_tasks(tmp_path: Path) -> None:
     assert again is not None
     np.testing.assert_array_equal(first.tasks[0].photons, again.tasks[0].photons)
     (tmp_path / "paints.csv").write_text(PAINTS.replace("0.5", "0.4"))
-    with pytest.raises(OutputError, match=r"these differ from the run: .*paints.csv:yellow"):
+    with pytest.raises(OutputError, match=r"not the files of the run: paints.csv"):
         study_of(output, tmp_path)
