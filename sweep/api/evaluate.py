@@ -189,7 +189,8 @@ def _of_run(
     own = replace(space, kind="design", axes=axes, gridded=True, listed=0)
     mosaic = study.mosaics[space.cfa]
     names = _curve_names(study.sensor, space.cfa, mosaic) | dict(study.section.cfas[space.cfa].curves)
-    study = replace(study, scenarios={scenario: study.scenarios[scenario]}, warnings=())
+    features = {name: feature for name, feature in study.features.items() if not feature.slow}
+    study = replace(study, scenarios={scenario: study.scenarios[scenario]}, warnings=(), features=features)
     if lights is not None:
         study = _under(study, _lit(lights, stated))
     name = row["name"] if isinstance(row["name"], str) else f"filter {row['filter_id']}"
@@ -209,10 +210,7 @@ def _under(study: Study, keys: Mapping[str, Any]) -> Study:
     other = make_study(**keys, cfas=["RGGB"], wavelengths=study.grid).study
     if "files" in keys["lights"].keys:
         other = replace(other, lights=replace(other.lights, photon_ratio=study.lights.photon_ratio))
-    under = replace(study, lights=other.lights, objective=other.objective, features={})
-    constraints = {name: bound for name, bound in study.constraints.items() if name in under.quantities}
-    notes = [f"{name} is not known under these lights" for name in study.constraints if name not in constraints]
-    return replace(under, constraints=constraints, warnings=(*other.warnings, *notes))
+    return replace(study, lights=other.lights, features={}, warnings=other.warnings)
 
 
 def _curve_names(sensor: SensorCurves, cfa: str, mosaic: Mosaic) -> dict[str, str]:

@@ -195,11 +195,16 @@ def evaluate_filter(
     cfas = {name: own if name in (base.name, changed) else CfaSection() for name in mosaics}
     spaces = (*(Space("reference", cfa, cfa) for cfa in mosaics if cfa != changed), replace(space, cfa=changed))
     section = study.section.model_copy(update={"cfas": cfas})
+    goal = csd_name(_pair(study))
     study = replace(study, section=section, mosaics=mosaics, spaces=spaces, search=None)
+    study = replace(study, objective=Objective(minimum={goal: 1.0}))
+    constraints = {name: bound for name, bound in study.constraints.items() if name in study.quantities}
+    told = [*notes, *study.warnings, *brightness_note([goal], study.scenarios.values(), study.requested)]
+    told += [f"{name} is not computed here" for name in study.constraints if name not in constraints]
+    study = replace(study, constraints=constraints)
     rows = [(scene, one.cfa, columns_of(study, one, scene)) for scene in study.scenarios for one in spaces]
     light = next(float(columns[CFA_SENSITIVITY][0]) for _, cfa, columns in rows if cfa == changed)
-    bound, goal = _upper_bound(study, spaces[-1], light), [csd_name(_pair(study))]
-    told = [*notes, *study.warnings, *brightness_note(goal, study.scenarios.values(), study.requested)]
+    bound = _upper_bound(study, spaces[-1], light)
     return FilterEvaluation(study, changed, tuple(rows), tuple(told), *bound)
 
 
@@ -223,7 +228,7 @@ def _upper_bound(study: Study, space: Space, light: float) -> tuple[float | None
     curve, replaced, clear = curves[0, 0], study.sensor.curve(base), study.sensor.curve(clear_name)
     csd_dn = float(smooth_csd(setup, curves, pair)[0])
     larger = base if _is_below(curve, replaced) else f"the larger of {base} and itself"
-    goal, reason = Objective(minimum={csd_name(pair): 1.0}), ""
+    reason = ""
     for below, ceiling, exposed in (
         (base, replaced, False),
         (clear_name, clear, False),
@@ -233,7 +238,7 @@ def _upper_bound(study: Study, space: Space, light: float) -> tuple[float | None
             qe = setup.camera.qe.copy()
             qe[setup.camera.modified[0]] = ceiling
             of_any = any_filter_search(study, setup.with_camera(qe=qe))
-            as_designed = replace(of_any, objective=goal, constraints={}, tolerance=Tolerance())
+            as_designed = replace(of_any, constraints={}, tolerance=Tolerance())
             problem = with_lower_bound(as_designed, CFA_SENSITIVITY, light)
             if exposed and may_be_brightest(
                 problem.setup, float(study.grid.integrate(curve) / study.grid.integrate(ceiling))

@@ -178,7 +178,7 @@ def sensor(
     ----------
     source : path-like or pandas.DataFrame, optional
         A built-in sensor, a file of QE curves, or a table with one column per curve and nm as its index. Columns of a
-        file are matched to channels by their names, or by their shapes.
+        file are matched to channels by their names.
     relative_to : str, optional
         The values of `channels` are transmissions, to be multiplied by this curve of the sensor.
     name : str, optional

@@ -51,7 +51,7 @@ def test_a_worker_that_is_killed_once_costs_nothing(fewer: Study, unharmed: pd.D
 
 @pytest.mark.slow
 @pytest.mark.long
-@pytest.mark.parametrize("scenes", ["a", "abcd"])
+@pytest.mark.parametrize("scenes", ["a", "ab"])
 def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path, scenes: str) -> None:
     """In one part with other designs, or with those of other scenes."""
     wish = tmp_path / "wish"
