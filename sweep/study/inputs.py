@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.disk import is_file, is_folder, read_input
 from ..base.errors import DataError, StudyError, ValidationIssue
-from ..spectra.formats import files_in
+from ..spectra.formats import is_curve_file
 from ..spectra.read_text import MOST_BYTES
 from ..spectra.spectrum import Curves
 
@@ -27,9 +27,13 @@ Input = dict[str, bytes]
 
 
 def input_at(place: Path) -> Input:
-    """Read a file of curves, or a folder of such files."""
-    files = files_in(place) if is_folder(place) else [place]
-    return {file.relative_to(place.parent).as_posix(): read_input(file, MOST_BYTES, DataError) for file in files}
+    """Read a file of curves, or those of a folder that can be read."""
+    content = {}
+    for file in sorted(place.iterdir()) if is_folder(place) else [place]:
+        with suppress(DataError):  # of no use to the study either
+            if is_curve_file(file.name) or file == place:
+                content[file.relative_to(place.parent).as_posix()] = read_input(file, MOST_BYTES, DataError)
+    return content
 
 
 def input_given(curves: Curves) -> Input:

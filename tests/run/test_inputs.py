@@ -57,3 +57,20 @@ def test_a_damaged_archive_is_one_line(made: sweep.FinishedRun, tmp_path: Path, 
     said = commanded("check", folder / "study.resolved.yaml")[2]
     assert "no such file" in said
     assert tmp_path in folder.parents
+
+
+def test_a_catalog_with_files_of_no_use_is_kept(tmp_path: Path) -> None:
+    dyes = tmp_path / "dyes"
+    dyes.mkdir()
+    for name, peak in (("short", 600), ("long", 640)):
+        spectrum = pd.Series(np.exp(-(((NM - peak) / 20) ** 2)), NM, name="[absorbance]")
+        spectrum.to_csv(dyes / f"{name}.csv", index_label="nm")
+    (dyes / "notes.csv").write_text("no curves")
+    (dyes / "gone.csv").symlink_to(tmp_path / "nowhere")
+    (tmp_path / "dyed.yaml").write_text(
+        "study: dyed\nsensor: ar0820\nlights: tl16\ncfas: [RYNCy]\ncolorants: {catalog: [dyes]}\ndesigns:\n"
+        "  one: {cfa: RYNCy, channel: N, base: Y, family: mixture, at: {colorant_1: long, absorbance_1: 0.7}}\n"
+    )
+    run = sweep.load_study(tmp_path / "dyed.yaml").run(tmp_path / "out", jobs=1)
+    shutil.rmtree(dyes)
+    np.testing.assert_array_equal(run.study.evaluate().csd_yellow_red, run.table.csd_yellow_red)
