@@ -19,7 +19,8 @@ class Dip:
         center, width, depth = x.T[:, :, None]
         return self.base * (1 - depth * np.exp(-(((self.wavelength_nm - center) / width) ** 2) / 2))
 """)
-keys = {"channel": "N", "base": "Y", "family": "dip.py:Dip", "constraints": {"sensitivity": {"min": 0.9}}}
-study = sweep.make_study("dip", cfas=["RGGB", "RYNCy"], search={"starts": 4}, allow_code=True, **keys)
+dip = {"cfa": "RYNCy", "channel": "N", "base": "Y", "family": "dip.py:Dip"}
+keys = {"boxes": {"dip": dip}, "search": {"starts": 4}, "constraints": {"sensitivity": {"min": 0.9}}}
+study = sweep.make_study("dip", cfas=["RGGB", "RYNCy"], allow_code=True, **keys)
 print(study.evaluate(center_nm=[620, 630], width_nm=20, depth=1)[["center_nm", "csd_yellow_red", "sensitivity"]])
 print(study.run("outputs").summary)

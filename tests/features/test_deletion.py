@@ -19,7 +19,11 @@ from sweep.features import FEATURES, parts
 from ..build import STUDY
 from ..conftest import ROOT
 
-STATED = {"StudySection": "{key}: {{}}\n", "SearchSection": "search: {{{key}: {{}}}}\n"}
+STATED = {
+    "StudySection": "{key}: {{}}\n",
+    "SearchSection": "search: {{{key}: {{}}}}\n",
+    "CfaSection": "cfas: {{RGGB: {{{key}: {{}}}}, RYYCy: {{}}, RYNCy: {{}}}}\n",
+}
 """A key of a feature as a study states it."""
 CORE = ["base", "designs", "metrics", "results/test_records.py", "test_layers.py", "api/test_names.py"]
 """Quick tests of the core that are run without any feature."""
@@ -37,7 +41,8 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(ROOT / "outputs" / "README.md", folder / "outputs")
     keys = "|".join(key for name in FEATURES for at, key in keys_of(name) if at == "StudySection")
     for study in folder.glob("studies/*.yaml"):
-        study.write_text(re.sub(rf"^({keys}):.*\n(?: .*\n)*", "", study.read_text(), flags=re.MULTILINE))
+        text = re.sub(r"only: \[.*?\]", "", study.read_text())
+        study.write_text(re.sub(rf"^({keys}):.*\n(?: .*\n)*", "", text, flags=re.MULTILINE))
     return folder
 
 
@@ -90,9 +95,9 @@ def test_without_a_feature_the_rest_works(copy: Path, name: str) -> None:
         assert code == 0, text
         assert [*copy.glob(f"{name}/*/report.html")]
         for at, key in keys_of(name):
-            (copy / "key.yaml").write_text(
-                STUDY.replace("COUNT", "3").partition("search:")[0] + STATED[at].format(key=key)
-            )
+            line, text = STATED[at].format(key=key), STUDY.replace("COUNT", "3").partition("search:")[0]
+            before = re.sub(rf"^{line.partition(':')[0]}:.*\n", "", text, flags=re.MULTILINE)
+            (copy / "key.yaml").write_text(before + line)
             code, text = said(copy, "-m", "sweep", "check", "key.yaml")
             assert (code, f"{key}: unknown key" in text) == (2, True), text
         if name in commands:
