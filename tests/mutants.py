@@ -84,22 +84,17 @@ MUTANTS = (
     ),
     Mutant(
         "camera/readout",
-        "held = np.minimum(electrons, pixel.saturation_e) if clips else electrons",
-        "held = electrons",
+        "most_e = pixel.saturation_e if clips else np.inf",
+        "most_e = np.inf",
         PLAN,
     ),
     Mutant(
         "camera/electrons",
-        "dark = self._fixed_uniform + self.position",
-        "dark = self._fixed_uniform - self.position",
+        "+ camera.pixel.dark_e_per_s",
+        "- camera.pixel.dark_e_per_s",
         PLAN,
     ),
-    Mutant(
-        "camera/electrons",
-        "rates += uniform[:, :, None, :]",
-        "rates -= uniform[:, :, None, :]",
-        "camera/test_angle.py",
-    ),
+    Mutant("camera/electrons", "lit += self.fixed(exposure)[0]", "lit -= self.fixed(exposure)[0]"),
     Mutant(
         "camera/angular",
         "1 / np.sqrt(1 - sine_squared / index**2)",
@@ -137,7 +132,7 @@ MUTANTS = (
         "weighted = np.moveaxis(total_qe, -1, 0)",
     ),
     Mutant("metrics/separation", "start=weighted[0]) / counts.sum()", "start=weighted[0]) / counts.size"),
-    Mutant("metrics/objective", "weight * columns[name]", "columns[name] / weight", "search/test_tasks.py"),
+    Mutant("metrics/objective", "weight * columns[name]", "columns[name] / weight", "features/tasks/test_search.py"),
     Mutant("metrics/bound", "self.min - values", "values - self.min", SEARCH),
     Mutant("metrics/bound", "end = max(abs(self.min or 0.0)", "end = min(abs(self.min or 0.0)", RUNNER),
     Mutant("metrics/bound", "if quantity not in leave_out", "if quantity in leave_out", RUNNER),
@@ -192,8 +187,15 @@ MUTANTS = (
     Mutant("runs/rows", "[job.scenario, job.space, job.start, job.stop]", "[job.space, job.start, job.stop]", DAMAGE),
     Mutant("runs/kept", "answer {self._round}, {at}", "answer {at}", "search/test_search.py run/test_runner.py"),
     Mutant("runs/handovers", "capture.light * capture.qe_factor", "capture.qe_factor", "run/test_handovers.py"),
-    Mutant("runs/uncertainty", "weights * curve + rest", "weights + rest", "run/test_uncertain_search.py"),
-    Mutant("runs/check", "stored == exact or (math", "True or (math", "cli/test_audit.py run/test_runner.py"),
+    Mutant(
+        "features/draws/uncertainty",
+        "weights * curve + rest",
+        "weights + rest",
+        "features/draws/test_uncertain_search.py",
+    ),
+    Mutant(
+        "runs/check", "stored == exact or (math", "True or (math", "features/audit/test_audit.py run/test_runner.py"
+    ),
     Mutant("results/identity", '"files": dict(study.digests)', '"files": {}', IDENTITY),
     Mutant("results/identity", '"lights": lights.hexdigest()', '"lights": ""', IDENTITY),
     Mutant("results/identity", '"curves": curves.hexdigest()', '"curves": ""', IDENTITY),
@@ -233,8 +235,14 @@ class _Replaced(SourceFileLoader):
 
 
 def misplaced() -> list[Mutant]:
-    """Mutants whose text does not stand in its module exactly once."""
-    return [m for m in MUTANTS if (ROOT / "sweep" / f"{m.module}.py").read_text(encoding="utf-8").count(m.text) != 1]
+    """Mutants whose text does not stand in its module exactly once, or whose tests are gone."""
+
+    def is_placed(mutant: Mutant) -> bool:
+        module = ROOT / "sweep" / f"{mutant.module}.py"
+        known = module.is_file() and all((ROOT / "tests" / name).is_file() for name in mutant.tests.split())
+        return known and module.read_text(encoding="utf-8").count(mutant.text) == 1
+
+    return [mutant for mutant in MUTANTS if not is_placed(mutant)]
 
 
 def killer_of(mutant: Mutant) -> str:
