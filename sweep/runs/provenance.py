@@ -12,7 +12,7 @@ from typing import Any
 
 from ..results.identity import MODEL_VERSION, fingerprint
 from ..study import Study
-from ..study.document import yaml_text
+from ..study.tree import yaml_text
 
 _PACKAGES = ("cfa-sweep", "numpy", "scipy", "numba", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
 

@@ -13,8 +13,8 @@ from ..base.errors import Fault
 from ..base.types import Number, Section
 from ..camera.pixel import Pixel
 from ..camera.scene import Scene
-from .document import put
 from .schema_curves import Name
+from .tree import put
 
 FORMS = "a number, a list of numbers, `min`, `max` and `count`, or `geometric: [min, max, count]`"
 _MOST_COUNT = 1_000_000

@@ -20,10 +20,10 @@ from ..metrics.registry import quantities_of
 from ..metrics.separation import cfa_sensitivity
 from ..search.solver import ALGORITHMS, DIRECT, GRADIENT, ONE_START
 from .axes import Axis
-from .document import KeyPath
 from .model import Search, Study
 from .schema import StudySection
 from .sources import Sources
+from .tree import KeyPath
 
 _SLACK = 1e-9
 _MOST_LIGHT = 10.0

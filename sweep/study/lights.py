@@ -20,11 +20,11 @@ from ..spectra.light_files import lights_file
 from ..spectra.lights import Lights, make_lights
 from ..spectra.population import DRIFT_NM_PER_K
 from ..spectra.spectrum import WavelengthGrid
-from .document import KeyPath
 from .model import Study
 from .schema import MOST_TYPES, StudySection
 from .schema_curves import LightsSection
 from .sources import Sources
+from .tree import KeyPath
 from .user_code import offered_curves
 
 _MOST_SPECTRA = 20_000

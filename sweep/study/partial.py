@@ -9,8 +9,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..base.errors import Fault
-from .document import Document, Key, KeyPath, written
+from .document import Document, written
 from .schema import StudySection
+from .tree import Key, KeyPath
 
 _INSTEAD = {"study": "study", "sensor": "ar0820", "lights": "tl16", "cfas": ["RGGB"]}
 """What stands for a key that must be there and is faulty; nothing that depends on it is looked at."""

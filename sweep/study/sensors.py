@@ -16,10 +16,10 @@ from ..camera.sensor_field import PLACES, SensorField
 from ..designs.space import Space
 from ..spectra.facts import EACH_NORMALIZED, NORMALIZED, is_each_normalized, is_normalized_response
 from ..spectra.units import FITTING, Use
-from .document import KeyPath
 from .schema import StudySection
 from .schema_curves import CurveFile, SensorSection
 from .sources import Sources
+from .tree import KeyPath
 from .user_code import offered_curves
 
 _ROUNDING = 1e-9

@@ -30,10 +30,11 @@ from ..spectra.spectrum import (
     photons_from_energy,
 )
 from ..spectra.units import Use, used_as
-from .document import Document, KeyPath, by_line
+from .document import Document, by_line
 from .inputs import Input, input_at, input_given
 from .partial import Partial
 from .schema_curves import ColorantsSection, FileEntry
+from .tree import KeyPath
 
 _MOST_VALUES = 10_000_000
 """Most values of the curves of a sensor, or of lights, on the grid: 80 MB."""

@@ -19,10 +19,10 @@ from ..designs.space import Filter, Kind, Space
 from ..designs.technology import PIGMENT
 from ..spectra.builtin.surrogate import parameters_of
 from ..spectra.colorants import Colorants
-from .document import KeyPath
 from .schema import BoxSection, DesignSection, Modification, StudySection
 from .sensors import check_filter
 from .sources import Sources
+from .tree import KeyPath
 from .user_code import allowed, code_of, is_from_outside
 
 _MOST_POINTS = 2_000_000

@@ -33,11 +33,11 @@ from ..metrics.registry import every_feature, quantities_of
 from ..metrics.smooth import smooth_response
 from ..metrics.user_metrics import Readings, UserMetric
 from ..spectra.formats import digest
-from .document import KeyPath
 from .model import Study
 from .schema import StudySection
 from .schema_curves import LightsSection, SensorSection
 from .sources import Sources
+from .tree import KeyPath
 
 _Curves = TypeVar("_Curves", SensorSection, LightsSection)
 _Made = TypeVar("_Made")

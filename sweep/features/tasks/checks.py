@@ -16,9 +16,9 @@ from ...spectra.builtin.groups import groups, is_surface, spectra_of_group
 from ...spectra.formats import is_curve_file
 from ...spectra.spectrum import WavelengthGrid
 from ...spectra.units import Use
-from ...study.document import KeyPath
 from ...study.schema import StudySection
 from ...study.sources import Sources
+from ...study.tree import KeyPath
 from .keys import TaskFile, TasksSection, UserTask
 from .spectra import ILLUMINANTS, SHIPPED, Conditions, GriddedTask, StudyTasks
 from .task_sets import THERMAL_K, separation_task, shipped
