@@ -41,7 +41,9 @@ def study_reference() -> list[str]:
         lines += ["", f"## Keys of the feature {feature}", "", *_HEAD]
         for at, added in keys.items():
             section = _SCHEMA if at == "StudySection" else sections[at]
-            lines += [_row(key, section["properties"][key], section) for key in added]
+            rows = [_row(key, section["properties"][key], section) for key in added]
+            of = "" if at == "StudySection" else f" of {_link(at)}"
+            lines += [row.replace(f"`{key}`", f"`{key}`{of}", 1) for key, row in zip(added, rows, strict=True)]
         for name in names:
             lines += _heading(_title(name), sections[name])
             lines += [_row(key, prop, sections[name]) for key, prop in sections[name]["properties"].items()]

@@ -51,7 +51,7 @@ limit = study.upper_bound()
 print(f"{limit.proven:.1f} DN is the limit; ours reaches {table.csd_yellow_red[0] / limit.proven:.0%} of it")
 
 # %% [markdown]
-# Where does the filter stand among the curves and the lights?
+# Where does the filter stand among the curves of the sensor?
 
 # %%
 figure = study.curves.assign(N=mine).plot()

@@ -181,12 +181,12 @@ def _of_run(
 
     output = read_output(folder)
     study = study_of(output, data, allow_code=allow_code)
-    row = find_design_row(output, design or BEST)
+    row = find_design_row(output, BEST if design is None else design)
     space, scenario = row_space(study, row), str(row["scenario"])
     if space.filter is None:
         raise DataError(ValidationIssue("a plain CFA has no filter to judge", str(folder), None, "--design", design))
     axes = tuple((float(row[name]),) for name in space.parameters)
-    own = replace(space, kind="design", axes=axes, gridded=True, listed=0)
+    candidate = replace(space, kind="design", axes=axes, gridded=True, listed=0)
     mosaic = study.mosaics[space.cfa]
     names = _curve_names(study.sensor, space.cfa, mosaic) | dict(study.section.cfas[space.cfa].curves)
     features = {name: feature for name, feature in study.features.items() if not feature.slow}
@@ -195,7 +195,7 @@ def _of_run(
         study = _under(study, _lit(lights, stated))
     name = row["name"] if isinstance(row["name"], str) else f"filter {row['filter_id']}"
     note = f"{folder}: {name} of {space.cfa}, in scenario {scenario}"
-    return evaluate_filter(study, mosaic, own, names, [note])
+    return evaluate_filter(study, mosaic, candidate, names, [note])
 
 
 def _lit(lights: str, stated: Sequence[Quantity]) -> dict[str, Any]:

@@ -50,18 +50,16 @@ class FilterEvaluation:
     Parameters
     ----------
     study : Study
-        Scenes, CFAs and lights of the evaluation, and the constraints that the filter is held against.
-    cfa : str
-        CFA with the filter.
-    rows : tuple of (scenario, CFA, quantities)
-        Quantities of each CFA; in each scenario the filter's row is the last one.
+        Scene, CFAs and lights of the evaluation, and the constraints that the filter is held against.
+    rows : mapping of str to quantities
+        Quantities of each CFA; the one with the filter is the last.
     notes : tuple of str
         Notes on the way files were read.
     before_quantization_dn : float or None
         CSD of the filter before quantization, DN, of yellow and red or else of the first pair.
     upper_bound : float or None
         Upper bound on that CSD, DN, for any filter between 0 and the curve `below`, of the same technology and with at
-        least as much light, in the first scenario. None if `no_upper_bound` states a reason.
+        least as much light. None if `no_upper_bound` states a reason.
     below : str
         Curve below which the bound holds.
     no_upper_bound : str
@@ -69,8 +67,7 @@ class FilterEvaluation:
     """
 
     study: Study = field(repr=False)
-    cfa: str
-    rows: tuple[tuple[str, str, Columns], ...] = field(repr=False)
+    rows: Mapping[str, Columns] = field(repr=False)
     notes: tuple[str, ...]
     before_quantization_dn: float | None = None
     upper_bound: float | None = None
@@ -79,20 +76,19 @@ class FilterEvaluation:
 
     @property
     def violated(self) -> list[str]:
-        """Constraints that the filter does not meet in a scenario, or of which it is not known, each with its value."""
-        missed = []
+        """Constraints that the filter does not meet, or of which it is not known, each with its value."""
+        columns, violated = [*self.rows.values()][-1], []
         for name, bound in self.study.constraints.items():
-            for scene, cfa, columns in self.rows:
-                if cfa == self.cfa and not (bound.violation(columns[name]) <= FEASIBLE).all():
-                    where = f" in {scene}" if len(self.study.scenarios) > 1 else ""
-                    known = f"{columns[name][0]:.4g}" if np.isfinite(columns[name][0]) else "unknown"
-                    missed.append(f"{name} {known}{where} ({bound})")
-        return missed
+            if not (bound.violation(columns[name]) <= FEASIBLE).all():
+                value = f"{columns[name][0]:.4g}" if np.isfinite(columns[name][0]) else "unknown"
+                violated.append(f"{name} {value} ({bound})")
+        return violated
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """Quantities with one row per scenario and CFA; units and meanings are in ``attrs``."""
-        return table_of_results(self.study, [(cfa, cfa, scene, columns) for scene, cfa, columns in self.rows])
+        """Quantities with one row per CFA; units and meanings are in ``attrs``."""
+        (scene,) = self.study.scenarios
+        return table_of_results(self.study, [(cfa, cfa, scene, columns) for cfa, columns in self.rows.items()])
 
     @property
     def gap(self) -> float | None:
@@ -135,10 +131,7 @@ class FilterEvaluation:
         study, first = self.study, _pair(self.study)
         pairs = sorted(study.pairs, key=lambda pair: pair != first)
         goal, *others = [study.quantities[csd_name(pair)].column for pair in pairs]
-        scenes = [*study.scenarios]
-        for scene in scenes:
-            rows = {cfa: columns for name, cfa, columns in self.rows if name == scene}
-            yield from _aligned(rows, (goal, *others), scene if len(scenes) > 1 else "CFA")
+        yield from _aligned(self.rows, (goal, *others))
         if study.constraints:
             met = f"not met: {', '.join(self.violated)}" if self.violated else "met"
             stated = ", ".join(f"{name} {bound}" for name, bound in study.constraints.items())
@@ -152,16 +145,15 @@ class FilterEvaluation:
         bound, has = goal.format_bound(self.upper_bound), goal.amount(self.before_quantization_dn, 1)
         technology = study.spaces[-1].filter and study.spaces[-1].filter.technology
         alike = f" that works by {technology.description}" if technology else ""
-        where = f" in {scenes[0]}" if len(scenes) > 1 else ""
         yield (
-            f"{goal.words[:1].upper()}{goal.words[1:]} before quantization{where}: no filter between 0 and "
+            f"{goal.words[:1].upper()}{goal.words[1:]} before quantization: no filter between 0 and "
             f"{self.below} with as much light{alike} exceeds {bound} (proven); this one has {has}{gap}."
         )
 
 
-def _aligned(rows: Mapping[str, Columns], columns: Sequence[Column], corner: str) -> Iterator[str]:
-    """Yield one line per CFA of a scene: CSDs and CFA sensitivity."""
-    head = [corner, *("/".join(column.pair or ()) for column in columns), "light"]
+def _aligned(rows: Mapping[str, Columns], columns: Sequence[Column]) -> Iterator[str]:
+    """Yield one line per CFA: CSDs and CFA sensitivity."""
+    head = ["CFA", *("/".join(column.pair or ()) for column in columns), "light"]
     cells = [
         [cfa, *(c.amount(float(values[c.name][0]), 1) for c in columns), f"{values[CFA_SENSITIVITY][0]:.3f}"]
         for cfa, values in rows.items()
@@ -181,7 +173,7 @@ def with_base(mosaic: Mosaic, bases: Mapping[str, str]) -> Mosaic:
 def evaluate_filter(
     study: Study, mosaic: Mosaic, space: Space, curve_names: Mapping[str, str], notes: Sequence[str]
 ) -> FilterEvaluation:
-    """Evaluate the one filter of a space on a CFA in every scenario of a study, with every effect of the scene.
+    """Evaluate the one filter of a space on a CFA in the one scenario of a study, with every effect of the scene.
 
     `curve_names`: curves of channels whose names differ.
     """
@@ -191,21 +183,21 @@ def evaluate_filter(
     mosaics[base.name] = base
     changed = mosaic.name if mosaic.name not in mosaics else f"own {mosaic.name}"
     mosaics[changed] = replace(mosaic, name=changed)
-    own = CfaSection(curves={c: name for c, name in curve_names.items() if c not in bases})
-    cfas = {name: own if name in (base.name, changed) else CfaSection() for name in mosaics}
+    others = CfaSection(curves={c: name for c, name in curve_names.items() if c not in bases})
+    cfas = {name: others if name in (base.name, changed) else CfaSection() for name in mosaics}
     spaces = (*(Space("reference", cfa, cfa) for cfa in mosaics if cfa != changed), replace(space, cfa=changed))
     section = study.section.model_copy(update={"cfas": cfas})
     goal = csd_name(_pair(study))
     study = replace(study, section=section, mosaics=mosaics, spaces=spaces, search=None)
     study = replace(study, objective=Objective(minimum={goal: 1.0}))
     constraints = {name: bound for name, bound in study.constraints.items() if name in study.quantities}
-    told = [*notes, *study.warnings, *brightness_note([goal], study.scenarios.values(), study.requested)]
-    told += [f"{name} is not computed here" for name in study.constraints if name not in constraints]
+    notes = [*notes, *study.warnings, *brightness_note([goal], study.scenarios.values(), study.requested)]
+    notes += [f"{name} is not computed here" for name in study.constraints if name not in constraints]
     study = replace(study, constraints=constraints)
-    rows = [(scene, one.cfa, columns_of(study, one, scene)) for scene in study.scenarios for one in spaces]
-    light = next(float(columns[CFA_SENSITIVITY][0]) for _, cfa, columns in rows if cfa == changed)
-    bound = _upper_bound(study, spaces[-1], light)
-    return FilterEvaluation(study, changed, tuple(rows), tuple(told), *bound)
+    (scene,) = study.scenarios
+    rows = {candidate.cfa: columns_of(study, candidate, scene) for candidate in spaces}
+    bound = _upper_bound(study, spaces[-1], float(rows[changed][CFA_SENSITIVITY][0]))
+    return FilterEvaluation(study, rows, tuple(notes), *bound)
 
 
 def _pair(study: Study) -> Pair:
@@ -222,7 +214,8 @@ def _upper_bound(study: Study, space: Space, light: float) -> tuple[float | None
     assert space.filter is not None
     if len(space.filter.bases) > 1:
         return None, None, "", "more than one modified channel"
-    setup, pair = study.setup(space, next(iter(study.scenarios))), _pair(study)
+    (scene,) = study.scenarios
+    setup, pair = study.setup(space, scene), _pair(study)
     curves: DesignCurves = space.curves(space.points(0, 1), study.grid.size)
     ((base,), clear_name) = space.filter.bases.values(), study.sensor.clear
     curve, replaced, clear = curves[0, 0], study.sensor.curve(base), study.sensor.curve(clear_name)

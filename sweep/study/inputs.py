@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,7 +13,7 @@ from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile, ZipInfo
 
 import numpy as np
 
-from ..base.disk import is_file, is_folder, read_input
+from ..base.disk import is_folder, read_input
 from ..base.errors import DataError, StudyError, ValidationIssue
 from ..spectra.formats import is_curve_file
 from ..spectra.read_text import MOST_BYTES
@@ -22,6 +23,18 @@ INPUTS = "inputs.zip"
 """Its name beside a `*.resolved.yaml`."""
 _NAMES, _GIVEN = "names.json", ".given"
 _MOST_UNPACKED = 2_000_000_000
+_DAMAGES = (
+    StopIteration,
+    BadZipFile,
+    zlib.error,
+    EOFError,
+    RuntimeError,
+    ValueError,
+    TypeError,
+    LookupError,
+    AttributeError,
+)
+"""What zipfile and json raise for archives that are not as a run wrote them."""
 Input = dict[str, bytes]
 """Bytes of a file, or of the files of a folder, by name; of curves that Python gave."""
 
@@ -55,21 +68,23 @@ def archive_of(inputs: Mapping[str, Input]) -> bytes:
 
 @contextmanager
 def unpacked(archive: Path) -> Iterator[tuple[dict[str, Path], dict[str, Curves]]]:
-    """Yield the places of the files of an archive, and curves that Python gave, by their names; none without one."""
-    with TemporaryDirectory() as folder:
+    """Yield the places of the files of an archive, and curves that Python gave, by their names."""
+    with ExitStack() as stack:
         try:
-            found = _unpacked(archive, Path(folder)) if is_file(archive) else ({}, {})
-        except (BadZipFile, OSError, ValueError, LookupError, StopIteration) as error:
+            content = _unpacked(archive, Path(stack.enter_context(TemporaryDirectory())))
+        except OSError as error:
+            raise StudyError(ValidationIssue(f"cannot be unpacked: {error.strerror or error}", str(archive))) from None
+        except _DAMAGES as error:
             raise StudyError(ValidationIssue(f"is damaged: {type(error).__name__}", str(archive))) from None
-        yield found
+        yield content
 
 
 def _unpacked(archive: Path, folder: Path) -> tuple[dict[str, Path], dict[str, Curves]]:
     with ZipFile(archive) as content:
         if sum(info.file_size for info in content.infolist()) > _MOST_UNPACKED:
             raise StudyError(ValidationIssue("too large", str(archive), allowed=f"{_MOST_UNPACKED:,} bytes"))
+        names = json.loads(content.read(_NAMES))
         content.extractall(folder)
-    names = json.loads((folder / _NAMES).read_bytes())
     places = {name: next((folder / str(number)).iterdir()) for number, name in enumerate(names)}
     given = {}
     for name in [name for name, place in places.items() if place.name == _GIVEN]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..base.disk import is_folder
+from ..base.disk import is_file, is_folder
 from ..base.errors import StudyError, ValidationIssue
 from ..features import modules
 from ..spectra.spectrum import Curves
@@ -60,9 +60,10 @@ def load_study(
     folders = [path.parent] if data is None else [data, path.parent]
     sources = Sources(document, section.wavelengths, folders, allow_code=allow_code, partial=partial)
     sources.warnings += notes
+    archive = path.with_name(INPUTS)
     with ExitStack() as stack:
-        if data is None and path.name.endswith(RESOLVED):
-            sources.kept, sources.given = stack.enter_context(unpacked(path.with_name(INPUTS)))
+        if data is None and path.name.endswith(RESOLVED) and is_file(archive):
+            sources.kept, sources.given = stack.enter_context(unpacked(archive))
         try:
             return resolve(section, sources)
         except StudyError as error:

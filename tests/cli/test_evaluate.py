@@ -119,8 +119,9 @@ def test_a_design_of_a_run_is_held_against_all_that_the_run_constrains(tmp_path:
     run = study.run(tmp_path, jobs=1)
     found = sweep.evaluate(run.folder, design="one")
     assert found.violated == []
-    row = found.table.iloc[-1]
-    assert {row[c] == pytest.approx(run.table.iloc[-1][c]) for c in ("edge_width_nm", "worst_csd_yellow_red")} == {True}
+    row, of_run = found.table.iloc[-1], run.table.iloc[-1]
+    for column in ("edge_width_nm", "worst_csd_yellow_red"):
+        assert row[column] == pytest.approx(of_run[column])
     leds = csv(tmp_path, "wavelength_nm,b,c", WAVE, *(bell(c, 12) for c in (592, 636)), name="leds.csv")
     code, out, _ = commanded("evaluate", run.folder, "--design", "one", "--lights", leds)
     assert (code, "csd_orange_red is not computed here." in out) == (0, True)

@@ -43,20 +43,18 @@ def test_the_folder_of_a_run_is_a_study_without_its_files(made: sweep.FinishedRu
     pd.testing.assert_frame_equal(again.table, made.table, check_exact=True)
     assert Manifest(again.folder).fingerprint == Manifest(made.folder).fingerprint
     assert (again.folder / "inputs.zip").read_bytes() == (made.folder / "inputs.zip").read_bytes()
-    np.testing.assert_array_equal(made.study.evaluate().csd_yellow_red, made.table.csd_yellow_red)
+    np.testing.assert_allclose(made.study.evaluate().csd_yellow_red, made.table.csd_yellow_red, rtol=1e-9)
 
 
 @pytest.mark.parametrize("damage", [b"", b"PK\x05\x06" + bytes(18), b"no archive"])
-def test_a_damaged_archive_is_one_line(made: sweep.FinishedRun, tmp_path: Path, damage: bytes) -> None:
+def test_a_damaged_archive_is_one_line(made: sweep.FinishedRun, damage: bytes) -> None:
     folder = made.folder
     (folder / "inputs.zip").write_bytes(damage)
     assert "inputs.zip: is damaged" in commanded("status", folder, "--verify")[2]
     code, out, said = commanded("check", folder / "study.resolved.yaml")
     assert (code, out, said.count("\n"), "inputs.zip: is damaged" in said) == (2, "", 1, True)
     (folder / "inputs.zip").unlink()
-    said = commanded("check", folder / "study.resolved.yaml")[2]
-    assert "no such file" in said
-    assert tmp_path in folder.parents
+    assert "no such file" in commanded("check", folder / "study.resolved.yaml")[2]
 
 
 def test_a_catalog_with_files_of_no_use_is_kept(tmp_path: Path) -> None:
@@ -73,4 +71,4 @@ def test_a_catalog_with_files_of_no_use_is_kept(tmp_path: Path) -> None:
     )
     run = sweep.load_study(tmp_path / "dyed.yaml").run(tmp_path / "out", jobs=1)
     shutil.rmtree(dyes)
-    np.testing.assert_array_equal(run.study.evaluate().csd_yellow_red, run.table.csd_yellow_red)
+    np.testing.assert_allclose(run.study.evaluate().csd_yellow_red, run.table.csd_yellow_red, rtol=1e-9)

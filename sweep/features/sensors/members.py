@@ -168,7 +168,7 @@ def of_member(error: StudyError, member: SensorAndLights) -> StudyError:
     issues = []
     for issue in error.issues:
         allowed = issue.allowed
-        if issue.problem.startswith("no curve for channel"):
+        if allowed is not None and (issue.key or "").startswith("cfas."):
             allowed = f"`only: [SENSOR, ...]` of the CFA; or {allowed}"
         issues.append(replace(issue, problem=f"{member.sensor}: {issue.problem}", allowed=allowed))
     return StudyError(issues)
